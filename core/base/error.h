@@ -1,0 +1,45 @@
+// The one exception type of gonio: bad input, found at a boundary, said so that the user can mend it.
+#pragma once
+#include <source_location>
+#include <stdexcept>
+#include <string>
+
+namespace gonio {
+
+enum class ErrorCode {
+    usage,          // the command line itself is wrong
+    invalid_input,  // a job, a surface or a table that cannot be used as it is
+    missing_unit,   // a length whose unit nobody stated
+    not_found,      // a file that is not there
+    io,             // the system refused to read or write
+    limit,          // larger than a configured limit
+    cancelled,      // the user stopped the work
+    internal,       // a defect of gonio
+};
+
+// `field` is the path of the offending value (a JSON pointer such as "/surface/width", or a file name), `value` what was
+// found there, `what()` the whole sentence: field, value and what is allowed.
+class Error : public std::runtime_error {
+  public:
+    Error(ErrorCode code, std::string field, std::string value, const std::string& allowed,
+          std::source_location where = std::source_location::current())
+        : std::runtime_error(sentence(field, value, allowed)),
+          code_(code), field_(std::move(field)), value_(std::move(value)), where_(where) {}
+
+    ErrorCode code() const { return code_; }
+    const std::string& field() const { return field_; }
+    const std::string& value() const { return value_; }
+    std::source_location where() const { return where_; }
+
+  private:
+    static std::string sentence(const std::string& field, const std::string& value, const std::string& allowed) {
+        std::string text = field;
+        if (!value.empty()) text += (text.empty() ? "" : " = ") + value;
+        return text.empty() ? allowed : text + ": " + allowed;
+    }
+    ErrorCode code_;
+    std::string field_, value_;
+    std::source_location where_;
+};
+
+}  // namespace gonio
