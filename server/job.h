@@ -1,0 +1,71 @@
+// The job document as nouns: what the command line, the batch runner and the HTTP service share.
+// server/README.md is its reference, job_schema.json its JSON Schema; tests hold the three together. No JSON
+// is left past this header.
+#pragma once
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "material/material.h"
+#include "measure/plan.h"
+#include "surface/height_field.h"
+#include "surface/io/height_reader.h"
+#include "surface/prepare.h"
+
+namespace gonio {
+
+// Where the relief comes from. A file is not opened before load_job().
+struct FileSurface {
+    std::string path;  // as the document says, resolved against JobOrigin::folder
+    PrepareOptions options;
+};
+struct GridSurface {
+    RawHeights grid;  // row 0 at y = 0
+    PrepareOptions options;
+};
+struct GeneratedSurface {
+    std::string name;  // "v_groove", ...
+    std::function<HeightField()> generate;
+};
+using SurfaceSource = std::variant<FileSurface, GridSurface, GeneratedSurface>;
+
+struct MaterialSource {
+    Material material;       // complete, or with an empty reflectance if there is a map
+    std::string albedo_map;  // path of an image registered to the stored surface; empty for constant albedo
+};
+
+// What is measured. A new kind is one alternative here, one parser (server/README.md says where) and one
+// overload in run_job.cpp.
+using MeasurePlan = std::variant<BrdfPlan>;
+
+struct OutputRequest {
+    std::string format;  // one of table_formats()
+    std::string path;    // relative to the folder that the caller chooses
+};
+
+struct Job {
+    SurfaceSource surface;
+    MaterialSource material;
+    MeasurePlan plan;
+    std::vector<OutputRequest> outputs;
+};
+
+// What a document does not say about itself.
+struct JobOrigin {
+    std::string name = "gonio";  // outputs without a path are called <name>.<format>
+    std::string folder = ".";    // relative input files are looked up here
+};
+
+// Throws Error whose field is the JSON pointer of the offending value. Opens no file.
+Job parse_job(std::string_view text, const JobOrigin& origin);
+
+// Only the "surface" section of a document; others are refused. For `gonio info` and `gonio ndf`.
+SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin);
+
+// The JSON Schema (draft 2020-12) of the document.
+std::string_view job_schema();
+
+}  // namespace gonio

@@ -1,0 +1,72 @@
+#include <algorithm>
+
+#include "base/error.h"
+#include "base/text.h"
+#include "server/load_job.h"
+
+namespace gonio {
+namespace {
+
+const char* const field = "/material/albedo";
+
+// The map in the place of the heights: same stored grid, same way to the prepared one, its numbers untouched.
+PrepareOptions registration(const SurfaceSource& source) {
+    PrepareOptions options;
+    if (const auto* file = std::get_if<FileSurface>(&source)) options = file->options;
+    if (const auto* grid = std::get_if<GridSurface>(&source)) options = grid->options;
+    PrepareOptions same_place;
+    same_place.y_up = options.y_up;
+    same_place.crop = options.crop;
+    same_place.resample = options.resample;
+    same_place.boundary = options.boundary;
+    same_place.pitch_x = same_place.pitch_y = same_place.height_scale = 1;
+    return same_place;
+}
+
+RawHeights read_albedos(const std::string& path) {
+    RawHeights raw = read_heights(path);
+    const double scale = raw.integer_max > 0 ? 1 / raw.integer_max : 1;
+    for (size_t k = 0; k < raw.values.size(); ++k) {
+        raw.values[k] *= scale;
+        if (!(raw.values[k] >= 0 && raw.values[k] <= 1)) {
+            throw Error(ErrorCode::invalid_input, field, number_text(raw.values[k]),
+                        path + ": albedos must lie from 0 to 1; found at column " +
+                            std::to_string(k % raw.nx) + ", row " + std::to_string(k / raw.nx));
+        }
+    }
+    raw.bits = 0, raw.integer_max = 0;
+    raw.pitch_x = raw.pitch_y = raw.height_unit = std::nullopt;
+    return raw;
+}
+
+Lambertian load_map(const std::string& path, const SurfaceSource& source, const LoadedSurface& loaded) {
+    RawHeights raw = read_albedos(path);
+    const int nx = loaded.stored_nx ? loaded.stored_nx : loaded.surface.nx;
+    const int ny = loaded.stored_ny ? loaded.stored_ny : loaded.surface.ny;
+    if (raw.nx != nx || raw.ny != ny) {
+        throw Error(ErrorCode::invalid_input, field, std::to_string(raw.nx) + " x " + std::to_string(raw.ny),
+                    path + ": the map must have the size of the surface, " + std::to_string(nx) + " x " +
+                        std::to_string(ny));
+    }
+    const HeightField map = prepare_surface(std::move(raw), registration(source)).surface;
+    Lambertian lambertian;
+    lambertian.map_nx = map.nx, lambertian.map_ny = map.ny;
+    lambertian.map.reserve(map.heights.size());
+    for (const float above_mean : map.heights) {
+        lambertian.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
+    }
+    return lambertian;
+}
+
+}  // namespace
+
+Material load_material(const MaterialSource& source, const SurfaceSource& surface_source,
+                       const LoadedSurface& surface) {
+    Material material = source.material;
+    if (!source.albedo_map.empty())
+        material.reflectance = load_map(source.albedo_map, surface_source, surface);
+    validate(material, surface.surface.nx, surface.surface.ny);
+    return material;
+}
+
+}  // namespace gonio

@@ -1,0 +1,37 @@
+// "measure": {"kind": "brdf", ...}
+#include "base/error.h"
+#include "server/job_sections.h"
+
+namespace gonio {
+namespace {
+
+constexpr size_t max_rows = 1u << 28;
+constexpr uint64_t max_orders = 1000;
+
+int parse_max_order(const JsonNode& node) {
+    if (node.raw().is_string()) {
+        if (node.raw() != "all") node.refuse(R"(must be "all" or a whole number from 1)");
+        return 0;
+    }
+    return static_cast<int>(node.whole_number(1, max_orders));
+}
+
+}  // namespace
+
+BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
+    measure.allow_keys({"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders"});
+    BrdfPlan plan;
+    parse_direction_pairs(measure, plan);
+    if (const size_t rows = plan.incident.size() * plan.outgoing.size();
+        plan.pairs.empty() && rows > max_rows) {
+        throw Error(ErrorCode::limit, measure.path(), std::to_string(rows) + " pairs of directions",
+                    "at most " + std::to_string(max_rows));
+    }
+    if (const auto order = measure.find("max_order")) plan.max_order = parse_max_order(*order);
+    if (const auto orders = measure.find("orders"))
+        plan.separate_orders = orders->choice({"sum", "separate"}) == "separate";
+    plan.accuracy = accuracy;
+    return plan;
+}
+
+}  // namespace gonio

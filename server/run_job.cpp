@@ -1,0 +1,76 @@
+#include "server/run_job.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include "base/error.h"
+#include "server/job_hash.h"
+#include "table/io/table_io.h"
+
+namespace gonio {
+namespace {
+
+BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOptions& options,
+                    const Monitor& monitor) {
+    BrdfResult result = loaded.reference
+                            ? measure_reference(loaded.surface.surface, loaded.material, plan,
+                                                *loaded.reference, options, monitor)
+                            : measure_brdf(loaded.surface.surface, loaded.material, plan, options, monitor);
+    const std::vector<std::pair<std::string, std::string>> origin = {
+        {"program", program_version()},
+        {"job_hash", loaded.hash},
+        {"surface_hash", loaded.surface.hash},
+        {"surface", loaded.surface.description},
+        {"seed", std::to_string(plan.accuracy.seed)},
+    };
+    result.table.provenance.insert(result.table.provenance.begin(), origin.begin(), origin.end());
+    return result;
+}
+
+}  // namespace
+
+LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference) {
+    LoadedJob loaded{job, load_surface(job.surface), {}, reference, ""};
+    loaded.material = load_material(job.material, job.surface, loaded.surface);
+    loaded.hash = job_hash(loaded.surface.hash, loaded.material, job.plan, reference ? &*reference : nullptr);
+    return loaded;
+}
+
+BrdfResult run_job(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor) {
+    return std::visit([&](const auto& plan) { return run_plan(loaded, plan, options, monitor); },
+                      loaded.job.plan);
+}
+
+std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::string& folder) {
+    std::vector<OutputRequest> files = loaded.job.outputs;
+    for (OutputRequest& file : files) {
+        std::filesystem::path path(file.path);
+        if (loaded.reference)
+            path.replace_filename(path.stem().string() + ".reference" + path.extension().string());
+        file.path = (std::filesystem::path(folder) / path).lexically_normal().string();
+    }
+    return files;
+}
+
+void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs) {
+    for (const OutputRequest& output : outputs) {
+        if (const auto folder = std::filesystem::path(output.path).parent_path(); !folder.empty()) {
+            std::error_code failure;
+            std::filesystem::create_directories(folder, failure);
+            if (failure)
+                throw Error(ErrorCode::io, folder.string(), "", "cannot be made: " + failure.message());
+        }
+        write_table(table, output.format, output.path);
+    }
+}
+
+bool is_result_of(const std::string& path, const std::string& job_hash) {
+    // The header of an OpenEXR file lists thousands of channels before it comes to "job_hash".
+    std::string head(size_t{2} << 20, '\0');
+    std::ifstream in(path, std::ios::binary);
+    in.read(head.data(), static_cast<std::streamsize>(head.size()));
+    head.resize(static_cast<size_t>(std::max<std::streamsize>(in.gcount(), 0)));
+    return head.find(job_hash) != std::string::npos;
+}
+
+}  // namespace gonio

@@ -1,0 +1,40 @@
+// A job from its document to its files.
+#pragma once
+#include <string>
+#include <vector>
+
+#include "base/monitor.h"
+#include "measure/brdf.h"
+#include "measure/reference.h"
+#include "server/job.h"
+#include "server/load_job.h"
+
+namespace gonio {
+
+// A job with its surface and material in memory, ready to run.
+struct LoadedJob {
+    Job job;
+    LoadedSurface surface;
+    Material material;
+    std::optional<ReferenceOptions> reference;  // run by the path tracer instead of the fast engine
+    std::string hash;                           // job_hash
+};
+
+LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference = std::nullopt);
+
+// Runs it. table.provenance opens with program, job_hash, surface_hash, surface and seed; what the engine
+// chose follows.
+BrdfResult run_job(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor = {});
+
+// Where the outputs of a job go under `folder`; a reference writes "lava.reference.csv" for "lava.csv".
+std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::string& folder);
+
+// Writes every output; missing folders are made.
+void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs);
+
+// Whether `path` is a result of this very job: its head carries the hash. Files are renamed into place whole,
+// so a head that is there stands for the whole file; and 64 hex digits do not appear by chance, so that no
+// format needs a reader for this.
+bool is_result_of(const std::string& path, const std::string& job_hash);
+
+}  // namespace gonio
