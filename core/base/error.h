@@ -24,11 +24,12 @@ class Error : public std::runtime_error {
     Error(ErrorCode code, std::string field, std::string value, const std::string& allowed,
           std::source_location where = std::source_location::current())
         : std::runtime_error(sentence(field, value, allowed)),
-          code_(code), field_(std::move(field)), value_(std::move(value)), where_(where) {}
+          code_(code), field_(std::move(field)), value_(std::move(value)), allowed_(allowed), where_(where) {}
 
     ErrorCode code() const { return code_; }
     const std::string& field() const { return field_; }
     const std::string& value() const { return value_; }
+    const std::string& allowed() const { return allowed_; }
     std::source_location where() const { return where_; }
 
   private:
@@ -38,7 +39,7 @@ class Error : public std::runtime_error {
         return text.empty() ? allowed : text + ": " + allowed;
     }
     ErrorCode code_;
-    std::string field_, value_;
+    std::string field_, value_, allowed_;
     std::source_location where_;
 };
 
