@@ -1,0 +1,159 @@
+#include "measure/reference.h"
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <string>
+
+#include "base/parallel.h"
+#include "scattering/path_tracer.h"
+
+namespace gonio {
+namespace {
+
+// CPU seconds of the process: wall clock says little on a shared machine.
+double cpu_seconds() {
+    return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+// The pairs of one view.
+struct View {
+    int outgoing = 0;
+    std::vector<size_t> rows;
+    std::vector<Vec3> lights;
+};
+
+std::vector<View> group_by_view(const Table& table) {
+    std::vector<View> views(table.outgoing.size());
+    for (size_t o = 0; o < views.size(); ++o) views[o].outgoing = static_cast<int>(o);
+    for (size_t row = 0; row < table.rows(); ++row) {
+        const auto [i, o] = table.pair(row);
+        views[o].rows.push_back(row);
+        views[o].lights.push_back(to_vector(table.incident[i]));
+    }
+    std::erase_if(views, [](const View& view) { return view.rows.empty(); });
+    return views;
+}
+
+double rms_relative_error(const Table& table) {
+    double mean = 0, sum = 0;
+    size_t n = 0;
+    for (size_t c = 0; c < table.channels.size(); ++c)
+        for (size_t row = 0; row < table.rows(); ++row, ++n) mean += table.f[table.index(c, 0, row)];
+    mean /= static_cast<double>(n);
+    for (size_t c = 0; c < table.channels.size(); ++c)
+        for (size_t row = 0; row < table.rows(); ++row) {
+            const size_t k = table.index(c, 0, row);
+            const double floor = std::max<double>(table.f[k], 0.01 * mean);
+            if (floor > 0) sum += (table.se[k] / floor) * (table.se[k] / floor);
+        }
+    return std::sqrt(sum / static_cast<double>(n));
+}
+
+}  // namespace
+
+BrdfResult measure_reference(const HeightField& surface, const Material& material, const BrdfPlan& plan,
+                             const ReferenceOptions& reference, const RunOptions& options,
+                             const Monitor& monitor) {
+    validate(material, surface.nx, surface.ny);
+    if (reference.paths < 1)
+        throw Error(ErrorCode::invalid_input, "paths", std::to_string(reference.paths), "at least 1");
+    if (plan.separate_orders && plan.max_order < 1)
+        throw Error(ErrorCode::invalid_input, "/measure/max_order", "all",
+                    "separate orders need a number of orders");
+    const long long scene_bytes = EmbreeScene::estimated_bytes(surface);
+    if (scene_bytes > options.max_bytes)
+        throw Error(ErrorCode::limit, "/surface",
+                    std::to_string(surface.nx) + " x " + std::to_string(surface.ny),
+                    "the path tracer needs about " + std::to_string(scene_bytes >> 20) + " MiB for it");
+
+    BrdfResult result;
+    Table& table = result.table;
+    table.incident = plan.incident;
+    table.outgoing = plan.outgoing;
+    table.pairs = plan.pairs;
+    table.channels = material.channels;
+    table.orders = plan.separate_orders ? plan.max_order : 0;
+    const size_t n_channels = table.channels.size(), n_slices = table.slices();
+    const size_t n_values = n_channels * n_slices;
+    table.f.resize(n_values * table.rows());
+    table.se.resize(table.f.size());
+    // Zero, for the paths are unbiased. It would hold what rounding does to rays within 1e-6 of an edge
+    // (`lost` counts a part).
+    table.bias.resize(table.f.size());
+
+    monitor.report({0, "building the scene", 0});
+    const double start = cpu_seconds();
+    const auto& lambertian = std::get<Lambertian>(material.reflectance);
+    const PathTracer tracer(
+        surface, lambertian, static_cast<int>(n_channels),
+        {reference.paths, plan.max_order, table.orders, plan.accuracy.seed, options.allow_skips});
+    const double built = cpu_seconds();
+
+    // Work in waves of (view, block) tasks, small enough for the memory and for frequent progress. The sums
+    // are added in the order of the tasks, so neither the size of a wave nor the number of threads shows in
+    // the bits.
+    const std::vector<View> views = group_by_view(table);
+    size_t most_lights = 1;
+    for (const View& view : views) most_lights = std::max(most_lights, view.lights.size());
+    const long long tally_bytes = static_cast<long long>(most_lights * n_values * 2 * sizeof(double));
+    const long long by_memory = std::max(1LL, (options.max_bytes - scene_bytes) / 4 / tally_bytes);
+    const long long blocks = tracer.blocks(), n_tasks = blocks * static_cast<long long>(views.size());
+    const long long wave = std::min<long long>(by_memory, 4LL * std::max(1, options.n_threads));
+    const double scale = tracer.scale();
+    RayCounts rays;
+    PathTally total;
+    std::vector<PathTally> tallies(std::min(wave, n_tasks));
+    for (long long first = 0; first < n_tasks; first += wave) {
+        monitor.report({static_cast<double>(first) / static_cast<double>(n_tasks), "path tracing", 0});
+        const int n = static_cast<int>(std::min(wave, n_tasks - first));
+        parallel_for(n, options.n_threads, [&](int k) {
+            const View& view = views[(first + k) / blocks];
+            tallies[k] = tracer.trace(view.outgoing, to_vector(table.outgoing[view.outgoing]), view.lights,
+                                      static_cast<int>((first + k) % blocks), monitor);
+        });
+        for (int k = 0; k < n; ++k) {
+            rays += tallies[k].rays;
+            if ((first + k) % blocks == 0) {
+                total = std::move(tallies[k]);
+            } else {
+                for (size_t m = 0; m < total.sum.size(); ++m) {
+                    total.sum[m] += tallies[k].sum[m];
+                    total.squared_spread[m] += tallies[k].squared_spread[m];
+                }
+            }
+            if ((first + k) % blocks != blocks - 1) continue;
+            const View& view = views[(first + k) / blocks];
+            for (size_t l = 0; l < view.rows.size(); ++l)
+                for (size_t slice = 0; slice < n_slices; ++slice)
+                    for (size_t c = 0; c < n_channels; ++c) {
+                        const size_t from = (l * n_slices + slice) * n_channels + c;
+                        const size_t to = table.index(c, slice, view.rows[l]);
+                        table.f[to] = static_cast<float>(scale * total.sum[from]);
+                        table.se[to] = static_cast<float>(scale * std::sqrt(total.squared_spread[from]));
+                    }
+        }
+    }
+    monitor.report({1, "path tracing", 0});
+
+    Report& report = result.report;
+    const double traced = cpu_seconds() - built,
+                 n_rays = static_cast<double>(rays.camera + rays.bounce + rays.shadow);
+    report.settings = {{"method", "path tracer"}, {"paths", std::to_string(tracer.paths())}};
+    report.seconds = {{"scene", built - start}, {"path tracing", traced}};
+    report.counters = {{"rays", n_rays},
+                       {"camera rays", static_cast<double>(rays.camera)},
+                       {"bounce rays", static_cast<double>(rays.bounce)},
+                       {"shadow rays", static_cast<double>(rays.shadow)},
+                       {"rays spared", static_cast<double>(rays.spared)},
+                       {"rays lost", static_cast<double>(rays.lost)},
+                       {"million rays per CPU second", traced > 0 ? 1e-6 * n_rays / traced : 0}};
+    if (rays.spared > 0) report.skipped = {{"rays steeper than the steepest facet", "they hit nothing"}};
+    report.relative_error = rms_relative_error(table);
+    table.provenance = {{"method", "path tracer"},
+                        {"seed", std::to_string(plan.accuracy.seed)},
+                        {"paths", std::to_string(tracer.paths())}};
+    return result;
+}
+
+}  // namespace gonio
