@@ -51,7 +51,7 @@ class EmbreeScene {
 
     // First facet of each ray. Origins lie in the period [0, nx) x [0, ny). coherent: neighbouring rays are
     // nearly parallel.
-    void first_hits(std::span<const SceneRay> rays, bool coherent, std::span<SceneHit> hits) const;
+    void first_hits(std::span<const SceneRay> rays, std::span<SceneHit> hits) const;
     // visible[k] = 1 if nothing lies from origins[index[k]] along `direction` (which points up) to infinity,
     // else 0.
     void visible(std::span<const ScenePoint> origins, std::span<const int> index, const ScenePoint& direction,

@@ -129,7 +129,7 @@ PathTracer::Vertices PathTracer::trace_paths(int view, const Vec3& wo, int block
     Vertices vertices;
     for (int order = 1; !rays.empty(); ++order) {
         hits.resize(rays.size());
-        scene_.first_hits(rays, order == 1, hits);
+        scene_.first_hits(rays, hits);
         next_rays.clear();
         next_path_of.clear();
         for (size_t k = 0; k < rays.size(); ++k) {
