@@ -13,10 +13,11 @@ struct SurfaceStatistics {
     double width = 0, depth = 0;                  // metres
     double sq = 0;                                // rms height about the mean, metres
     double height_min = 0, height_max = 0;        // metres, absolute
-    double rms_slope_x = 0, rms_slope_y = 0;      // over facets, weighted by base area
+    double rms_slope_x = 0, rms_slope_y = 0;      // over facets, weighted by base area; an open surface's seam is left out
     double max_slope = 0;                         // steepest facet, |grad h|
     double wrap_jump_x = 0, wrap_jump_y = 0;      // rms step across the seam / rms step inside; 1 is seamless
-    double correlation_length_x = 0, correlation_length_y = 0;  // metres: lag where the autocorrelation falls to 1/e
+    // Lag where the autocorrelation falls to 1/e, metres; 0 if it does not within half the period.
+    double correlation_length_x = 0, correlation_length_y = 0;
     int distinct_heights = 0;                     // number of distinct stored heights, counted to 70,000
     bool invariant_x = false, invariant_y = false;  // all columns (rows) alike
 };
