@@ -11,10 +11,12 @@ namespace gonio {
 
 // The measured D. Facets count with their own (not their base) area.
 struct NdfTable {
-    std::vector<double> theta_edges_deg;  // n_theta + 1, from 0 to 90: fine up to where 99.9 % of the base plane is reached
-    int n_phi = 0;                        // bins of 360 / n_phi degrees; bin k is centred at azimuth k * 360 / n_phi of the normal
-    std::vector<double> d;                // [theta][phi], 1/sr, mean over the bin
-    double projected_area_norm = 0;       // integral of D cos(theta) over the bins: 1 but for the width of the bins
+    std::vector<double>
+        theta_edges_deg;  // n_theta + 1, from 0 to 90: fine up to where 99.9 % of the base plane is reached
+    int n_phi = 0;  // bins of 360 / n_phi degrees; bin k is centred at azimuth k * 360 / n_phi of the normal
+    std::vector<double> d;  // [theta][phi], 1/sr, mean over the bin
+    double projected_area_norm =
+        0;  // integral of D cos(theta) over the bins: 1 but for the width of the bins
 
     int n_theta() const { return static_cast<int>(theta_edges_deg.size()) - 1; }
 };
@@ -22,14 +24,16 @@ struct NdfTable {
 struct NdfFit {
     NdfModel model = NdfModel::beckmann;
     bool isotropic = true;
-    // alpha_x belongs to the axis at rotation_deg, in (-45, 45] degrees from +x towards +y; alpha_y to the axis across.
-    // Isotropic: alpha_x == alpha_y == alpha. Else alpha = sqrt(alpha_x alpha_y). alpha_y (or alpha_x) is 0 on a surface that is
-    // invariant along an axis: then the model is the marginal distribution of the slopes across that axis.
+    // alpha_x belongs to the axis at rotation_deg, in (-45, 45] degrees from +x towards +y; alpha_y to the
+    // axis across. Isotropic: alpha_x == alpha_y == alpha. Else alpha = sqrt(alpha_x alpha_y). alpha_y (or
+    // alpha_x) is 0 on a surface that is invariant along an axis: then the model is the marginal distribution
+    // of the slopes across that axis.
     double alpha = 0, alpha_x = 0, alpha_y = 0, rotation_deg = 0;
     // Standard errors from the Fisher information of n_effective facets.
     double se_alpha = 0, se_alpha_x = 0, se_alpha_y = 0, se_rotation_deg = 0;
-    // Of n_effective facets (that is n_effective times the mean over facets), in slope space; differences between models of one
-    // surface mean what they would for independent facets. aic = 2 * parameters - 2 * log_likelihood.
+    // Of n_effective facets (that is n_effective times the mean over facets), in slope space; differences
+    // between models of one surface mean what they would for independent facets. aic = 2 * parameters - 2 *
+    // log_likelihood.
     double log_likelihood = 0, aic = 0;
     bool converged = false;
     std::string message = "fit was not called";
@@ -55,8 +59,8 @@ struct NdfOptions {
 };
 
 // All facets inside the measured border. Linear in their number; 4096 x 4096 takes seconds and some 500 MB.
-// Standard errors assume slopes that are jointly normal between places, which sets their correlation only; they grow optimistic on
-// surfaces whose slope variance itself wanders over the patch.
+// Standard errors assume slopes that are jointly normal between places, which sets their correlation only;
+// they grow optimistic on surfaces whose slope variance itself wanders over the patch.
 NdfResult measure_ndf(const HeightField& surface, const NdfOptions& options = {});
 
 // The four fits to independent slopes (each standing for the same base area), n_effective = their number.

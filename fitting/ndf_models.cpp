@@ -13,7 +13,8 @@ double ndf_value(const NdfShape& shape, const Vec3& m) {
 }
 
 double ndf_inverse_cdf(NdfModel model, double alpha, double u) {
-    // tan^2(theta) / alpha^2 is exponential (Beckmann) or log-logistic (GGX) [1, eqs. 28 and 35]; log1p keeps small u exact.
+    // tan^2(theta) / alpha^2 is exponential (Beckmann) or log-logistic (GGX) [1, eqs. 28 and 35]; log1p keeps
+    // small u exact.
     return std::atan(alpha * std::sqrt(model == NdfModel::beckmann ? -std::log1p(-u) : u / (1 - u)));
 }
 
