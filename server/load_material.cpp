@@ -18,9 +18,18 @@ PrepareOptions registration(const SurfaceSource& source) {
     same_place.y_up = options.y_up;
     same_place.crop = options.crop;
     same_place.resample = options.resample;
-    same_place.boundary = options.boundary;
+    // Cells mirror differently from nodes, see mirrored_cell; "open" keeps what is not periodic from
+    // wrapping.
+    same_place.boundary = options.boundary == Boundary::periodic ? Boundary::periodic : Boundary::open;
     same_place.pitch_x = same_place.pitch_y = same_place.height_scale = 1;
     return same_place;
+}
+
+// Of n cells, the one that cell k of a surface mirrored to 2 n shows. Nodes mirror as 0 .. n-1 n-1 .. 0, so
+// cell k, between nodes k and k + 1, has its twin at 2 n - 2 - k; the two flat cells at the mirror lines take
+// their neighbour's albedo.
+int mirrored_cell(int k, int n) {
+    return k < n ? k : std::max(0, 2 * n - 2 - k);
 }
 
 RawHeights read_albedos(const std::string& path) {
@@ -50,10 +59,13 @@ Lambertian load_map(const std::string& path, const SurfaceSource& source, const 
     }
     const HeightField map = prepare_surface(std::move(raw), registration(source)).surface;
     Lambertian lambertian;
-    lambertian.map_nx = map.nx, lambertian.map_ny = map.ny;
-    lambertian.map.reserve(map.heights.size());
-    for (const float above_mean : map.heights) {
-        lambertian.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
+    lambertian.map_nx = loaded.surface.nx, lambertian.map_ny = loaded.surface.ny;
+    lambertian.map.reserve(loaded.surface.heights.size());
+    for (int j = 0; j < lambertian.map_ny; ++j) {
+        for (int i = 0; i < lambertian.map_nx; ++i) {
+            const float above_mean = map.at(mirrored_cell(i, map.nx), mirrored_cell(j, map.ny));
+            lambertian.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
+        }
     }
     return lambertian;
 }

@@ -15,19 +15,10 @@ LoadedSurface from_stored(RawHeights raw, const PrepareOptions& options, const s
     loaded.stored_nx = raw.nx;
     loaded.stored_ny = raw.ny;
     loaded.description = name + ", " + raw.format + ", " + size_text(raw.nx, raw.ny);
-    loaded.notes = raw.notes;
     PreparedSurface prepared = prepare_surface(std::move(raw), options);
     loaded.surface = std::move(prepared.surface);
-    loaded.notes.insert(loaded.notes.end(), prepared.notes.begin(), prepared.notes.end());
+    loaded.notes = std::move(prepared.notes);
     return loaded;
-}
-
-// Generators name their own members ("groove_width"); in a job these are keys of "/surface".
-[[noreturn]] void throw_below_surface(const Error& error) {
-    const std::string sentence = error.what();
-    const size_t colon = sentence.find(": ");
-    throw Error(error.code(), "/surface/" + error.field(), error.value(),
-                colon == std::string::npos ? sentence : sentence.substr(colon + 2));
 }
 
 LoadedSurface load(const FileSurface& source) {
@@ -44,7 +35,8 @@ LoadedSurface load(const GeneratedSurface& source) {
     try {
         loaded.surface = source.generate();
     } catch (const Error& error) {
-        throw_below_surface(error);
+        // Generators name their own members ("groove_width"); in a job these are keys of "/surface".
+        throw Error(error.code(), "/surface/" + error.field(), error.value(), error.allowed());
     }
     loaded.description = "generated " + source.name + ", " + size_text(loaded.surface.nx, loaded.surface.ny);
     return loaded;

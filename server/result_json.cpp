@@ -10,8 +10,11 @@ namespace {
 using nlohmann::ordered_json;
 
 // File names may hold any bytes: what is not UTF-8 is replaced, never a reason to fail.
-std::string dumped(const ordered_json& j, int indent) {
-    return j.dump(indent, ' ', false, ordered_json::error_handler_t::replace);
+std::string dumped(const ordered_json& j, const JsonStyle& style) {
+    ordered_json named = ordered_json::object();
+    if (!style.job.empty()) named["job"] = style.job;
+    named.update(j);
+    return named.dump(style.indent, ' ', false, ordered_json::error_handler_t::replace);
 }
 
 template <class Value>
@@ -74,40 +77,41 @@ ordered_json opening(const std::string& status, const LoadedJob& job) {
 
 }  // namespace
 
-std::string surface_json(const LoadedSurface& surface, int indent) {
-    return dumped(to_json(surface), indent);
+std::string surface_json(const LoadedSurface& surface) {
+    return dumped(to_json(surface), {});
 }
 
 std::string result_json(const LoadedJob& job, const Report& report, const std::vector<OutputRequest>& written,
-                        int indent) {
+                        const JsonStyle& style) {
     ordered_json j = opening("done", job);
     j["outputs"] = to_json(written);
     j["report"] = to_json(report);
     j["surface"] = to_json(job.surface);
-    return dumped(j, indent);
+    return dumped(j, style);
 }
 
-std::string planned_json(const LoadedJob& job, int indent) {
+std::string planned_json(const LoadedJob& job, const JsonStyle& style) {
     ordered_json j = opening("planned", job);
     j["job"] = ordered_json::parse(canonical_job(job.surface.hash, job.material, job.job.plan,
                                                  job.reference ? &*job.reference : nullptr));
     j["surface"] = to_json(job.surface);
-    return dumped(j, indent);
+    return dumped(j, style);
 }
 
-std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>& present, int indent) {
+std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>& present,
+                         const JsonStyle& style) {
     ordered_json j = opening("skipped", job);
     j["outputs"] = to_json(present);
-    return dumped(j, indent);
+    return dumped(j, style);
 }
 
-std::string failure_json(const Error& error, int indent) {
+std::string failure_json(const Error& error, const JsonStyle& style) {
     return dumped({{"status", "failed"},
                    {"code", error_code_name(error.code())},
                    {"field", error.field()},
                    {"value", error.value()},
                    {"message", error.what()}},
-                  indent);
+                  style);
 }
 
 std::string error_code_name(ErrorCode code) {

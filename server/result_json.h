@@ -8,20 +8,25 @@
 
 namespace gonio {
 
-// All indented by `indent` spaces; -1: on one line.
-std::string surface_json(const LoadedSurface& surface, int indent);
+struct JsonStyle {
+    int indent = 2;   // -1: all on one line, as batches print
+    std::string job;  // first member "job", if not empty: which of many this is
+};
 
-// status "done": job_hash, surface, outputs written, report.
+std::string surface_json(const LoadedSurface& surface);
+
+// status "done": job_hash, outputs written, report, surface.
 std::string result_json(const LoadedJob& job, const Report& report, const std::vector<OutputRequest>& written,
-                        int indent);
+                        const JsonStyle& style = {});
 
 // A job that did not run: status "planned" (dry run, with the canonical job) or "skipped" (its result is
 // there already).
-std::string planned_json(const LoadedJob& job, int indent);
-std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>& present, int indent);
+std::string planned_json(const LoadedJob& job, const JsonStyle& style = {});
+std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>& present,
+                         const JsonStyle& style = {});
 
 // status "failed": code, field, value, message.
-std::string failure_json(const Error& error, int indent);
+std::string failure_json(const Error& error, const JsonStyle& style = {});
 
 // "invalid_input", ...
 std::string error_code_name(ErrorCode code);

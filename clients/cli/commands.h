@@ -1,0 +1,25 @@
+// The subcommands, one file each. A new one is a file, a declaration here and a line in main.cpp.
+#pragma once
+#include <functional>
+
+#include "clients/cli/options.h"
+
+namespace CLI {
+class App;
+}
+
+namespace gonio {
+
+// What the chosen subcommand does once the whole command line is parsed; returns the exit code.
+using Action = std::function<int()>;
+
+void add_run(CLI::App& app, CommonOptions& common, Action& action);
+void add_measure(CLI::App& app, CommonOptions& common, Action& action);
+void add_batch(CLI::App& app, CommonOptions& common, Action& action);
+void add_info(CLI::App& app, CommonOptions& common, Action& action);
+void add_reference(CLI::App& app, CommonOptions& common, Action& action);
+void add_plot(CLI::App& app, CommonOptions& common, Action& action);
+void add_ndf(CLI::App& app, CommonOptions& common, Action& action);
+void add_schema(CLI::App& app, Action& action);
+
+}  // namespace gonio

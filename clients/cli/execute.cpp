@@ -1,0 +1,81 @@
+#include "clients/cli/execute.h"
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+
+#include "base/text.h"
+#include "clients/cli/console.h"
+#include "clients/cli/interrupt.h"
+#include "server/result_json.h"
+
+namespace gonio {
+
+std::string read_text(const std::string& path) {
+    if (path == "-") return {std::istreambuf_iterator<char>(std::cin), {}};
+    std::error_code failure;
+    if (!std::filesystem::exists(path, failure)) throw Error(ErrorCode::not_found, path, "", "no such file");
+    std::ifstream in(path, std::ios::binary);
+    std::string text{std::istreambuf_iterator<char>(in), {}};
+    if (!in || std::filesystem::is_directory(path, failure))
+        throw Error(ErrorCode::io, path, "", "cannot be read");
+    return text;
+}
+
+Job read_job(const std::string& path) {
+    if (path == "-") return parse_job(read_text(path), {});
+    const std::filesystem::path file(path);
+    return parse_job(read_text(path), {file.stem().string(), file.parent_path().string()});
+}
+
+Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
+                     const CommonOptions& common) {
+    Monitor monitor;
+    monitor.cancel_requested = &interrupt_requested();
+    ProgressBar bar(common.quiet);
+    monitor.on_progress = [&](const Progress& progress) { bar.update(progress); };
+    const BrdfResult result = run_job(loaded, common.run_options(), monitor);
+    monitor.check_cancelled();
+    write_outputs(result.table, files);
+    return result.report;
+}
+
+int execute_job(const Job& job, const CommonOptions& common,
+                const std::optional<ReferenceOptions>& reference) {
+    const LoadedJob loaded = load_job(job, reference);
+    if (!common.quiet) print_surface(loaded.surface, std::cerr);
+    if (common.dry_run) {
+        std::cout << planned_json(loaded) << std::endl;
+        return 0;
+    }
+    const std::vector<OutputRequest> files = output_files(loaded, common.folder);
+    const Report report = run_and_write(loaded, files, common);
+    if (!common.quiet) {
+        print_report(report, std::cerr);
+        for (const OutputRequest& file : files) std::cerr << "wrote " << file.path << std::endl;
+    }
+    if (common.json) std::cout << result_json(loaded, report, files) << std::endl;
+    return 0;
+}
+
+int exit_code(ErrorCode code) {
+    switch (code) {
+        case ErrorCode::usage:
+            return 2;
+        case ErrorCode::invalid_input:
+        case ErrorCode::missing_unit:
+        case ErrorCode::not_found:
+            return 3;
+        case ErrorCode::cancelled:
+            return cancelled_exit_code();
+        case ErrorCode::limit:
+            return 6;
+        case ErrorCode::io:
+        case ErrorCode::internal:
+            return 1;
+    }
+    return 1;
+}
+
+}  // namespace gonio

@@ -1,0 +1,28 @@
+// Running one job for a person: what `run`, `measure`, `reference` and `batch` have in common.
+#pragma once
+#include <string>
+
+#include "clients/cli/options.h"
+#include "server/run_job.h"
+
+namespace gonio {
+
+// Reads a job file ("-": stdin) and parses it; relative inputs are looked up beside it.
+Job read_job(const std::string& path);
+
+// The text of a file ("-": stdin). Throws Error(not_found), Error(io).
+std::string read_text(const std::string& path);
+
+// Shows the surface, runs, writes the outputs, shows the report; or only says what would run. Exit code 0.
+// Throws Error.
+int execute_job(const Job& job, const CommonOptions& common,
+                const std::optional<ReferenceOptions>& reference = std::nullopt);
+
+// The part of it behind loading: runs with a progress bar and writes the outputs.
+Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
+                     const CommonOptions& common);
+
+// What exit codes mean: README.md.
+int exit_code(ErrorCode code);
+
+}  // namespace gonio
