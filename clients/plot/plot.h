@@ -1,5 +1,6 @@
-// Figures for people who would rather look than read. Every function draws one figure to `path`, SVG or PNG by its extension, written
-// aside and renamed like a table. Errors: Error(invalid_input) for another extension or for nothing to draw, Error(io).
+// Figures for people who would rather look than read. Every function draws one figure to `path`, SVG or PNG
+// by its extension, written aside and renamed like a table. Errors: Error(invalid_input) for another
+// extension or for nothing to draw, Error(io).
 #pragma once
 #include <string>
 #include <vector>
@@ -10,14 +11,15 @@
 namespace gonio {
 
 struct PlotOptions {
-    std::string title;      // empty: the surface's name from the provenance
-    int incident = -1;      // index of the incident direction of the map; -1: the one nearest to 45 degrees
-    std::string channel;    // of the map; empty: the middle one
+    std::string title;       // empty: the surface's name from the provenance
+    int incident = -1;       // index of the incident direction of the map; -1: the one nearest to 45 degrees
+    std::string channel;     // of the map; empty: the middle one
     bool log_scale = false;  // of the map's colours
 };
 
-// Left: polar diagram of f against theta_o in the plane of incidence, for a few incident directions (for several channels: one), with
-// error bands; lines only join samples that the table holds. Right: the outgoing hemisphere seen from above, in colours.
+// Left: polar diagram of f against theta_o in the plane of incidence, for a few incident directions (for
+// several channels: one), with error bands; lines only join samples that the table holds. Right: the outgoing
+// hemisphere seen from above, in colours.
 void plot_table(const Table& table, const std::string& path, const PlotOptions& options = {});
 
 // D in the planes of the fitted axes, measured and fitted, on a logarithmic axis.
@@ -26,7 +28,7 @@ void plot_ndf(const NdfResult& ndf, const std::string& path, const std::string& 
 struct PlotSeries {
     std::string name;
     std::vector<double> x, y;
-    bool is_dashed = false;   // for references and extrapolations
+    bool is_dashed = false;  // for references and extrapolations
 };
 
 struct LinePlotOptions {
@@ -35,6 +37,7 @@ struct LinePlotOptions {
 };
 
 // Benchmark charts. Points that are not finite, or not positive on a logarithmic axis, are left out.
-void plot_lines(const std::vector<PlotSeries>& series, const std::string& path, const LinePlotOptions& options);
+void plot_lines(const std::vector<PlotSeries>& series, const std::string& path,
+                const LinePlotOptions& options);
 
 }  // namespace gonio
