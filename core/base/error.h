@@ -6,6 +6,17 @@
 
 namespace gonio {
 
+#ifdef __cpp_lib_source_location
+using SourceLocation = std::source_location;
+#else
+// Debian 12's clang (for the fuzz targets) does not have it yet.
+struct SourceLocation {
+    static constexpr SourceLocation current() { return {}; }
+    constexpr const char* file_name() const { return ""; }
+    constexpr unsigned line() const { return 0; }
+};
+#endif
+
 enum class ErrorCode {
     usage,          // the command line itself is wrong
     invalid_input,  // a job, a surface or a table that cannot be used as it is
@@ -17,30 +28,35 @@ enum class ErrorCode {
     internal,       // a defect of gonio
 };
 
-// `field` is the path of the offending value (a JSON pointer such as "/surface/width", or a file name), `value` what was
-// found there, `what()` the whole sentence: field, value and what is allowed.
+// `field` is the path of the offending value (a JSON pointer such as "/surface/width", or a file name),
+// `value` what was found there, `what()` the whole sentence: field, value and what is allowed.
 class Error : public std::runtime_error {
   public:
     Error(ErrorCode code, std::string field, std::string value, const std::string& allowed,
-          std::source_location where = std::source_location::current())
+          SourceLocation where = SourceLocation::current())
         : std::runtime_error(sentence(field, value, allowed)),
-          code_(code), field_(std::move(field)), value_(std::move(value)), allowed_(allowed), where_(where) {}
+          code_(code),
+          field_(std::move(field)),
+          value_(std::move(value)),
+          allowed_(allowed),
+          where_(where) {}
 
     ErrorCode code() const { return code_; }
     const std::string& field() const { return field_; }
     const std::string& value() const { return value_; }
     const std::string& allowed() const { return allowed_; }
-    std::source_location where() const { return where_; }
+    SourceLocation where() const { return where_; }
 
   private:
-    static std::string sentence(const std::string& field, const std::string& value, const std::string& allowed) {
+    static std::string sentence(const std::string& field, const std::string& value,
+                                const std::string& allowed) {
         std::string text = field;
         if (!value.empty()) text += (text.empty() ? "" : " = ") + value;
         return text.empty() ? allowed : text + ": " + allowed;
     }
     ErrorCode code_;
     std::string field_, value_, allowed_;
-    std::source_location where_;
+    SourceLocation where_;
 };
 
 }  // namespace gonio

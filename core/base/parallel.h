@@ -9,9 +9,10 @@
 
 namespace gonio {
 
-// Runs task(i) for i in [0, n_tasks) on n_threads threads, in any order. The caller fixes the partition: a task may write
-// only what belongs to its own i, and whoever reduces does so in the order of i. That, and not luck, gives the same bits on
-// any number of threads. The first exception stops the hand-out of tasks and is thrown again here.
+// Runs task(i) for i in [0, n_tasks) on n_threads threads, in any order. The caller fixes the partition: a
+// task may write only what belongs to its own i, and whoever reduces does so in the order of i. That, and not
+// luck, gives the same bits on any number of threads. The first exception stops the hand-out of tasks and is
+// thrown again here.
 template <class Task>
 void parallel_for(int n_tasks, int n_threads, Task&& task) {
     n_threads = std::min(n_threads, n_tasks);

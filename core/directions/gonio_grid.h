@@ -9,13 +9,14 @@ namespace gonio {
 // Every theta with every phi, theta slowest.
 std::vector<AnglesDeg> product_grid(const std::vector<double>& theta_deg, const std::vector<double>& phi_deg);
 
-// n directions over the upper hemisphere, each standing for the same projected solid angle pi / n: a Fibonacci lattice on the
-// unit disk lifted to the hemisphere (sin^2 theta = (k + 1/2) / n). n >= 1.
+// n directions over the upper hemisphere, each standing for the same projected solid angle pi / n: a
+// Fibonacci lattice on the unit disk lifted to the hemisphere (sin^2 theta = (k + 1/2) / n). n >= 1.
 std::vector<AnglesDeg> equal_projected_hemisphere(int n);
 
-// Centres of the 145 patches of the Klems full basis: rings with theta bounds 0-5-15-...-75-90 deg and 1, 8, 16, 20, 24, 24,
-// 24, 16, 12 azimuths; patch k of a ring is centred at azimuth 360 k / n (shared/formats 2.3; Klems 1994). Directions point
-// away from the surface, phi = azimuth for light and view alike (the incident-azimuth turn of the XML files is the writer's).
+// Centres of the 145 patches of the Klems full basis: rings with theta bounds 0-5-15-...-75-90 deg and 1, 8,
+// 16, 20, 24, 24, 24, 16, 12 azimuths; patch k of a ring is centred at azimuth 360 k / n (shared/formats 2.3;
+// Klems 1994). Directions point away from the surface, phi = azimuth for light and view alike (the
+// incident-azimuth turn of the XML files is the writer's).
 std::vector<AnglesDeg> klems_full();
 
 }  // namespace gonio

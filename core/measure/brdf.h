@@ -1,4 +1,5 @@
-// The main job: the BRDF of a relief with shadowing, masking and all orders of scattering, each value with its doubt.
+// The main job: the BRDF of a relief with shadowing, masking and all orders of scattering, each value with
+// its doubt.
 #pragma once
 #include "base/monitor.h"
 #include "material/material.h"
@@ -14,7 +15,8 @@ struct BrdfResult {
     Report report;
 };
 
-// Throws Error for what validate() would refuse, Error(limit) if the job cannot fit options.max_bytes, Error(cancelled).
+// Throws Error for what validate() would refuse, Error(limit) if the job cannot fit options.max_bytes,
+// Error(cancelled).
 BrdfResult measure_brdf(const HeightField& surface, const Material& material, const BrdfPlan& plan,
                         const RunOptions& options, const Monitor& monitor = {});
 

@@ -5,7 +5,7 @@
 namespace gonio {
 
 struct ReferenceOptions {
-    long long paths = 4096;  // paths from each outgoing direction; each is shared by all incident ones. Rounded up to a square.
+    long long paths = 4096;  // paths from each outgoing direction; each is shared by all incident ones. Rounded up to twice a square.
 };
 
 // plan.accuracy.seed seeds it; the rest of plan.accuracy is not used.

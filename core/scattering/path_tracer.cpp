@@ -59,14 +59,8 @@ PathTracer::PathTracer(const HeightField& surface, const Lambertian& material, i
       options_(options),
       max_slope_(steepest_facet(surface)),
       scene_(surface) {
-    // Strata about square in cells; a relief of one row or column does not vary along it and needs no strata
-    // there.
-    const double strata = std::max(1.0, std::ceil(static_cast<double>(options.paths) / 2));
-    const double x = std::sqrt(strata * surface.nx / surface.ny);
-    strata_x_ = surface.nx == 1 && surface.ny > 1 ? 1
-                : surface.ny == 1                 ? static_cast<int>(strata)
-                                                  : static_cast<int>(std::max(1.0, std::round(x)));
-    strata_y_ = static_cast<int>(std::ceil(strata / strata_x_));
+    const double strata = std::max(1.0, static_cast<double>(options.paths) / 2);
+    strata_ = static_cast<int>(std::ceil(std::sqrt(strata)));
 }
 
 int PathTracer::blocks() const {
@@ -115,12 +109,12 @@ PathTracer::Vertices PathTracer::trace_paths(int view, const Vec3& wo, int block
         // Strata in strips of two rows: neighbours in the list are neighbours on the relief, and packets stay
         // coherent.
         const long long stratum = first_stratum + path / 2;
-        const long long strip = stratum / (2LL * strata_x_), in_strip = stratum % (2LL * strata_x_);
-        const long long rows = std::min(2LL, strata_y_ - 2 * strip);
+        const long long strip = stratum / (2LL * strata_), in_strip = stratum % (2LL * strata_);
+        const long long rows = std::min(2LL, strata_ - 2 * strip);
         const auto word = random(path, 0);
-        const double x = (static_cast<double>(in_strip / rows) + uniform_double(word[0])) / strata_x_ * s.nx;
+        const double x = (static_cast<double>(in_strip / rows) + uniform_double(word[0])) / strata_ * s.nx;
         const double y =
-            (static_cast<double>(2 * strip + in_strip % rows) + uniform_double(word[1])) / strata_y_ * s.ny;
+            (static_cast<double>(2 * strip + in_strip % rows) + uniform_double(word[1])) / strata_ * s.ny;
         rays[path] = {{static_cast<float>(x), static_cast<float>(y), scene_.top()}, down};
         path_of[path] = path;
     }

@@ -1,0 +1,336 @@
+#include "measure/run.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+
+namespace gonio {
+namespace {
+
+double cpu_seconds() {
+    timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+// The random shifts of one run: streams 0..: window position, sub-sample, direction lattice, jitter.
+struct Shifts {
+    uint64_t seed, stream;
+    double operator()(int which) const { return uniform_double(random_words(seed, stream, which)[0]); }
+};
+
+std::vector<Tile> make_tiles(const RunContext& context, const RunSettings& settings, const Shifts& shifts) {
+    const HeightField& s = *context.surface;
+    if (settings.tiles_x == 0) {
+        const CellRect whole{0, 0, s.nx, s.ny};
+        const CellRect core{s.border_x, s.border_y, s.nx - 2 * s.border_x, s.ny - 2 * s.border_y};
+        std::vector<Tile> tiles;
+        tiles.push_back(make_tile(s, whole, core, settings.refinement));
+        return tiles;
+    }
+    // A randomly shifted lattice of windows: with as many as fit it covers the surface once. Of an open
+    // surface, its inner rectangle.
+    const int inner_x = s.nx - 2 * s.border_x, inner_y = s.ny - 2 * s.border_y;
+    const int core_x = std::min(tile_core, inner_x), core_y = std::min(tile_core, inner_y);
+    const bool open = s.border_x > 0 || s.border_y > 0;
+    std::vector<Tile> tiles;
+    for (int b = 0; b < settings.tiles_y; ++b)
+        for (int a = 0; a < settings.tiles_x; ++a) {
+            auto start = [&](int i, int n, double shift, int inner, int core, int border) {
+                const double place = (i + shift) / n;
+                return open ? border + static_cast<int>(place * (inner - core + 1))
+                            : static_cast<int>(place * inner);
+            };
+            const int x = start(a, settings.tiles_x, shifts(0), inner_x, core_x, s.border_x),
+                      y = start(b, settings.tiles_y, shifts(1), inner_y, core_y, s.border_y);
+            const int halo_x = std::min(tile_halo, (s.nx - core_x) / 2),
+                      halo_y = std::min(tile_halo, (s.ny - core_y) / 2);
+            const CellRect area{wrap_index(x - halo_x, s.nx), wrap_index(y - halo_y, s.ny),
+                                core_x + 2 * halo_x, core_y + 2 * halo_y};
+            tiles.push_back(make_tile(s, area, {halo_x, halo_y, core_x, core_y}, settings.refinement));
+        }
+    return tiles;
+}
+
+// Lights and views that are worked on together, and the table rows they answer.
+struct Block {
+    std::vector<int> lights, views;
+    bool same = false;
+    struct Row {
+        size_t row;
+        int light, view;  // inside the block
+    };
+    std::vector<Row> rows;
+};
+
+std::vector<Block> make_blocks(const RunContext& context, const RunSettings& settings) {
+    const int n_lights = static_cast<int>(context.lights.size()),
+              n_views = static_cast<int>(context.views.size());
+    std::vector<Block> blocks;
+    if (!context.view_to_light.empty() &&
+        run_bytes(context, settings, n_lights, 0) <= static_cast<double>(context.max_bytes)) {
+        Block block;
+        block.same = true;
+        for (int l = 0; l < n_lights; ++l) block.lights.push_back(l);
+        for (size_t r = 0; r < context.rows(); ++r) {
+            const auto [i, o] = context.plan->pairs.empty()
+                                    ? std::pair{static_cast<int>(r / n_views), static_cast<int>(r % n_views)}
+                                    : context.plan->pairs[r];
+            block.rows.push_back({r, i, context.view_to_light[o]});
+        }
+        blocks.push_back(std::move(block));
+        return blocks;
+    }
+    int most = 1 << 14;
+    while (most > column_block && run_bytes(context, settings, std::min(most, n_lights),
+                                            std::min(most, n_views)) > static_cast<double>(context.max_bytes))
+        most /= 2;
+    if (context.plan->pairs.empty()) {
+        for (int l = 0; l < n_lights; l += most)
+            for (int v = 0; v < n_views; v += most) {
+                Block block;
+                for (int i = l; i < std::min(n_lights, l + most); ++i) block.lights.push_back(i);
+                for (int o = v; o < std::min(n_views, v + most); ++o) block.views.push_back(o);
+                for (size_t i = 0; i < block.lights.size(); ++i)
+                    for (size_t o = 0; o < block.views.size(); ++o)
+                        block.rows.push_back({static_cast<size_t>(block.lights[i]) * n_views + block.views[o],
+                                              static_cast<int>(i), static_cast<int>(o)});
+                blocks.push_back(std::move(block));
+            }
+        return blocks;
+    }
+    // A list of pairs is answered from products of few directions each: sparse lists would waste larger ones.
+    const double density = static_cast<double>(context.rows()) / (static_cast<double>(n_lights) * n_views);
+    if (density < 0.1) most = std::min(most, 256);
+    std::vector<int> light_at(n_lights, -1), view_at(n_views, -1);
+    Block block;
+    auto flush = [&] {
+        for (const int l : block.lights) light_at[l] = -1;
+        for (const int v : block.views) view_at[v] = -1;
+        blocks.push_back(std::move(block));
+        block = {};
+    };
+    for (size_t r = 0; r < context.rows(); ++r) {
+        const auto [i, o] = context.plan->pairs[r];
+        const bool new_light = light_at[i] < 0, new_view = view_at[o] < 0;
+        if ((new_light && static_cast<int>(block.lights.size()) == most) ||
+            (new_view && static_cast<int>(block.views.size()) == most))
+            flush();
+        if (light_at[i] < 0) {
+            light_at[i] = static_cast<int>(block.lights.size());
+            block.lights.push_back(i);
+        }
+        if (view_at[o] < 0) {
+            view_at[o] = static_cast<int>(block.views.size());
+            block.views.push_back(o);
+        }
+        block.rows.push_back({r, light_at[i], view_at[o]});
+    }
+    flush();
+    return blocks;
+}
+
+std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& tile) {
+    std::vector<ChannelFactors> factors;
+    const Lambertian& m = *context.material;
+    if (!m.is_map()) return factors;
+    for (size_t c = 0; c < context.n_channels(); ++c) {
+        ChannelFactors f(tile.n_slots(), 0.0f);
+        for (int kind = 0; kind < 2; ++kind)
+            for (int row = 0; row < tile.area.height; ++row)
+                for (int column = 0; column < tile.area.width; ++column) {
+                    const int i = wrap_index(tile.area.x0 + column, tile.nx),
+                              j = wrap_index(tile.area.y0 + row, tile.ny);
+                    f[tile.slot(kind, row, column)] = std::sqrt(m.map[(c * m.map_ny + j) * m.map_nx + i]);
+                }
+        factors.push_back(std::move(f));
+    }
+    return factors;
+}
+
+// Sums over the windows of a run, for one block of lights and views.
+struct Sums {
+    std::vector<Matrix> direct;               // per map channel, or one
+    std::vector<std::vector<Matrix>> higher;  // [map channel or one][order]
+    std::vector<double> projected_lights, projected_views;
+    double core_area = 0;
+
+    void add(const Irradiance& irradiance, const std::vector<OrderSeries>& series, double area) {
+        auto add_matrix = [](const Matrix& from, Matrix& to) {
+            if (to.values.empty()) to = Matrix(from.rows, from.columns);
+            for (size_t k = 0; k < to.values.size(); ++k) to.values[k] += from.values[k];
+        };
+        auto add_vector = [](const std::vector<double>& from, std::vector<double>& to) {
+            to.resize(from.size(), 0.0);
+            for (size_t k = 0; k < to.size(); ++k) to[k] += from[k];
+        };
+        direct.resize(irradiance.direct.size());
+        higher.resize(irradiance.direct.size());
+        for (size_t c = 0; c < direct.size(); ++c) {
+            add_matrix(irradiance.direct[c], direct[c]);
+            if (c < series.size()) {
+                higher[c].resize(std::max(higher[c].size(), series[c].higher.size()));
+                for (size_t k = 0; k < series[c].higher.size(); ++k)
+                    add_matrix(series[c].higher[k], higher[c][k]);
+            }
+        }
+        add_vector(irradiance.projected_lights, projected_lights);
+        add_vector(irradiance.projected_views, projected_views);
+        core_area += area;
+    }
+};
+
+// From sums of products to f: f = 1 / (A cos_i cos_o) / pi * ..., divided by the projected areas P_l P_v,
+// which are exactly 1 in truth: a ratio estimator, up to 3 times less error for nothing.
+void write_rows(const RunContext& context, const Block& block, const Sums& sums, size_t slices,
+                RunValues& values) {
+    const size_t n_rows = context.rows(), n_channels = context.n_channels();
+    const bool map = context.material->is_map();
+    for (size_t c = 0; c < n_channels; ++c) {
+        const double albedo = map ? 1.0 : context.material->albedo[c];
+        const Matrix& direct = sums.direct[map ? c : 0];
+        const std::vector<Matrix>& higher = sums.higher[map ? c : 0];
+        const double x = albedo * values.ratio;
+        for (const Block::Row& row : block.rows) {
+            const double projected = sums.projected_lights[row.light] * sums.projected_views[row.view];
+            // area cos_i cos_o P_l P_v = projected_l projected_v / area
+            const double scale = projected > 0 ? albedo / pi * sums.core_area / projected : 0.0;
+            auto put = [&](size_t slice, double f) {
+                values.f[(c * slices + slice) * n_rows + row.row] = static_cast<float>(f);
+            };
+            const double first = scale * direct(row.light, row.view);
+            double total = first;
+            if (slices > 1) put(1, first);
+            if (context.combine_orders) {
+                if (!higher.empty()) total += scale * higher[0](row.light, row.view);
+            } else {
+                double power = 1;
+                for (size_t k = 0; k < higher.size(); ++k) {
+                    power *= albedo;
+                    const double order = scale * power * higher[k](row.light, row.view);
+                    total += order;
+                    if (k + 2 < slices) put(k + 2, order);
+                    if (k + 1 == higher.size()) total += order * x / (1 - x);
+                }
+            }
+            put(0, total);
+            if (c == 0) values.direct[row.row] = static_cast<float>(first);
+        }
+    }
+}
+
+}  // namespace
+
+double run_bytes(const RunContext& context, const RunSettings& settings, int n_lights, int n_views) {
+    const HeightField& s = *context.surface;
+    double cells = static_cast<double>(s.nx) * s.ny;
+    if (settings.tiles_x > 0) cells = std::min(cells, std::pow(tile_core + 2.0 * tile_halo, 2));
+    const double unknowns = 2 * cells * settings.refinement * settings.refinement;
+    const auto padded = [](int n) { return (n + column_block - 1) / column_block * column_block; };
+    // Irradiance, carried orders (three at once is typical), a second copy with several sub-samples or a map;
+    // sums in double.
+    const double copies = 4.0 + (settings.sub_samples > 1 ? 1 : 0) + (context.material->is_map() ? 1 : 0) +
+                          (context.combine_orders ? 0 : 4);
+    const double sums = static_cast<double>(padded(n_lights)) *
+                        padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
+    const double links =
+        unknowns * settings.directions / (settings.refinement * settings.refinement) * 0.35 * sizeof(Link);
+    return copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
+}
+
+RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
+                   const Monitor& monitor) {
+    const Shifts shifts{context.plan->accuracy.seed,
+                        static_cast<uint64_t>(stage) << 32 | static_cast<uint32_t>(run)};
+    const size_t n_rows = context.rows(), n_channels = context.n_channels();
+    RunValues values;
+    const std::vector<Tile> tiles = make_tiles(context, settings, shifts);
+
+    std::vector<SubSample> sub_samples, jitter;
+    for (int k = 0; k < settings.sub_samples; ++k)  // R2 sequence (Roberts), shifted
+        sub_samples.push_back({fractional_part(shifts(2) + k * 0.7548776662466927),
+                               fractional_part(shifts(3) + k * 0.5698402909980532)});
+    const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
+    const DirectionSet set = slab_directions(settings.directions, z_max, shifts(4), shifts(5));
+    for (int k = 0; k < settings.directions; ++k)
+        jitter.push_back({fractional_part(shifts(6) + k * 0.7548776662466927),
+                          fractional_part(shifts(7) + k * 0.5698402909980532)});
+
+    size_t slices = 0;
+    for (const Block& block : make_blocks(context, settings)) {
+        std::vector<Vec3> lights, views;
+        for (const int l : block.lights) lights.push_back(context.lights[l]);
+        if (block.same)
+            views = lights;
+        else
+            for (const int v : block.views) views.push_back(context.views[v]);
+        Sums sums;
+        for (const Tile& tile : tiles) {
+            monitor.check_cancelled();
+            const std::vector<ChannelFactors> factors = map_factors(context, tile);
+            double clock = cpu_seconds();
+            Irradiance irradiance =
+                compute_irradiance(*context.grid, tile, lights, views, block.same, sub_samples, factors,
+                                   context.skip_steep, n_threads, monitor);
+            values.rays += irradiance.rays;
+            values.rays_skipped += irradiance.rays_skipped;
+            values.truncated_bundles += irradiance.truncated_bundles;
+            values.seconds_direct += cpu_seconds() - clock;
+            std::vector<OrderSeries> series;
+            if (context.indirect && context.max_order != 1) {
+                clock = cpu_seconds();
+                const LinkOperator op =
+                    build_link_operator(*context.grid, tile, set, jitter, n_threads, monitor);
+                values.rays += op.rays;
+                values.links += op.links;
+                values.substituted += op.substituted;
+                values.dropped += op.dropped;
+                values.seconds_links += cpu_seconds() - clock;
+                clock = cpu_seconds();
+                SeriesOptions options;
+                options.max_order = context.max_order;
+                options.tolerance = context.series_tolerance;
+                options.fixed_applications = context.fixed_applications;
+                if (!context.material->is_map())
+                    options.largest_albedo =
+                        *std::max_element(context.material->albedo.begin(), context.material->albedo.end());
+                if (context.combine_orders) options.combine = options.largest_albedo;
+                const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),
+                             base_views = factors.size() > 1 ? irradiance.views : Fields();
+                for (size_t c = 0; c < std::max<size_t>(1, factors.size()); ++c) {
+                    if (!factors.empty()) {
+                        if (c > 0) {
+                            irradiance.lights = base_lights;
+                            irradiance.views = base_views;
+                        }
+                        scale_rows(irradiance.lights, tile, factors[c], n_threads);
+                        if (!block.same) scale_rows(irradiance.views, tile, factors[c], n_threads);
+                    }
+                    series.push_back(diffuse_series(op, tile, irradiance.lights, irradiance.view_fields(),
+                                                    block.same, factors.empty() ? nullptr : &factors[c],
+                                                    options, n_threads, monitor));
+                    values.ratio = std::max(values.ratio, series.back().ratio);
+                    values.remainder = std::max(values.remainder, series.back().remainder);
+                    values.applications = std::max(values.applications, series.back().applications);
+                    if (!context.combine_orders)
+                        values.higher_orders =
+                            std::max(values.higher_orders, static_cast<int>(series.back().higher.size()));
+                }
+                values.seconds_series += cpu_seconds() - clock;
+            }
+            sums.add(irradiance, series, tile.core_area());
+        }
+        if (slices == 0) {
+            slices = context.plan->separate_orders ? values.higher_orders + 2 : 1;
+            values.f.assign(n_channels * slices * n_rows, 0.0f);
+            values.direct.assign(n_rows, 0.0f);
+        }
+        write_rows(context, block, sums, slices, values);
+    }
+    return values;
+}
+
+}  // namespace gonio

@@ -1,0 +1,71 @@
+// One randomised run of the fast engine: a complete, unbiased table from one random shift of everything that
+// is shared. Independent runs give the mean and its standard error (Cranley-Patterson; design 3.3).
+#pragma once
+#include <vector>
+
+#include "base/monitor.h"
+#include "material/material.h"
+#include "measure/plan.h"
+#include "scattering/diffuse.h"
+#include "scattering/irradiance.h"
+
+namespace gonio {
+
+// What the runs of one job share.
+struct RunContext {
+    const HeightField* surface = nullptr;
+    const MarchGrid* grid = nullptr;
+    const Lambertian* material = nullptr;
+    const BrdfPlan* plan = nullptr;
+    std::vector<Vec3> lights, views;  // of plan->incident and plan->outgoing
+    // views[v] == lights[view_to_light[v]] for all v, and every light is a view: half the work. Empty
+    // otherwise.
+    std::vector<int> view_to_light;
+    bool indirect = true;  // false: black, or too gentle for light to be scattered twice
+    bool skip_steep = true;
+    bool combine_orders = true;  // one constant albedo, orders not asked for
+    int max_order = 0;
+    double series_tolerance = 1e-4;
+    int fixed_applications = 0;
+    long long max_bytes = 0;  // for one run
+
+    size_t rows() const { return plan->pairs.empty() ? lights.size() * views.size() : plan->pairs.size(); }
+    size_t n_channels() const {
+        return material->is_map()
+                   ? material->map.size() / (static_cast<size_t>(material->map_nx) * material->map_ny)
+                   : material->albedo.size();
+    }
+};
+
+struct RunSettings {
+    int sub_samples = 1;  // points per facet part for the direct term
+    int directions = 64;  // shared directions of the operator
+    int refinement = 1;
+    int tiles_x = 0, tiles_y = 0;  // windows per run; 0: the whole period at once
+    bool operator==(const RunSettings&) const = default;
+};
+
+inline constexpr int tile_core = 128, tile_halo = 32;  // cells
+
+struct RunValues {
+    int higher_orders = 0;  // single orders kept beyond the first (0 when combined)
+    int applications = 0;
+    double ratio = 0, remainder = 0;  // of the geometric continuation, see OrderSeries
+    // f in 1/sr, [channel][slice][row]; slices as in Table: 0 the sum, then single orders if they are kept
+    // apart for the table.
+    std::vector<float> f;
+    std::vector<float>
+        direct;  // channel 0: the first order alone, [row]: tells which part of the error dominates
+    double rays = 0, rays_skipped = 0, links = 0, substituted = 0, dropped = 0;
+    int truncated_bundles = 0;
+    double seconds_direct = 0, seconds_links = 0, seconds_series = 0;  // CPU of the calling threads
+};
+
+// run: number of the run inside its stage; (seed, stage, run) key its random numbers.
+RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
+                   const Monitor& monitor);
+
+// Working memory of one run that cannot be split further, bytes.
+double run_bytes(const RunContext& context, const RunSettings& settings, int n_lights, int n_views);
+
+}  // namespace gonio

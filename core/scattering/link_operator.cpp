@@ -1,0 +1,219 @@
+#include "scattering/link_operator.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "visibility/march.h"
+
+namespace gonio {
+namespace {
+
+// One ray bundle of the operator: a direction from one part of one facet kind.
+struct OperatorBundle {
+    RayBundle rays;
+    Vec3 direction;
+    double weight;  // solid angle / (2 pi) times the number of parts: half of the symmetric link
+    int kind, part;
+};
+
+// Lines of cells that are marched together. Bundles that march transposed run along y.
+struct LineGroup {
+    bool transposed;
+    int kind, part;
+    int first_line, n_lines;
+};
+
+struct PendingLink {
+    uint32_t start;  // of the ray: line * width + position inside its group of lines
+    Link link;
+};
+
+int into_period(int i, int n) {
+    return i >= 0 && i < n ? i : wrap_index(i, n);
+}
+
+// Column and row of the hit cell inside the tile, or nothing if the ray has left the tile.
+bool hit_cell(const Tile& tile, int column, int row, int& hit_column, int& hit_row) {
+    hit_column = into_period(column, tile.nx);
+    hit_row = into_period(row, tile.ny);
+    return hit_column < tile.area.width && hit_row < tile.area.height;
+}
+
+// Where inside its cell the ray hits, from the two crossings that bracket the hit.
+int hit_part(const MarchGrid& grid, const OperatorBundle& bundle, int cell_x, int cell_y, int k,
+             int refinement, int kind) {
+    const RayBundle& rays = bundle.rays;
+    const MarchPlane& plane = rays.transposed ? grid.transposed : grid.rows;
+    const int own_column = rays.transposed ? cell_y : cell_x,
+              own_row = rays.transposed ? cell_x : cell_y;  // of the surface
+    const float* own = &plane.heights[static_cast<size_t>(own_row) * plane.stride + own_column];
+    const float height = own[0] * rays.start_weight[0] +
+                         own[rays.start.kind == 0 ? 1 : plane.stride] * rays.start_weight[1] +
+                         own[plane.stride + 1] * rays.start_weight[2];
+    auto above = [&](int crossing) {
+        const Crossing& c = rays.crossings[crossing];
+        int column = own_column + c.column, row = own_row + c.row;
+        if (column >= plane.nx) column -= plane.nx;
+        if (row >= plane.ny) row -= plane.ny;
+        const float* p = &plane.heights[static_cast<size_t>(row) * plane.stride + column];
+        return static_cast<double>(p[0]) * c.weight0 + static_cast<double>(p[c.second_node]) * c.weight1 -
+               c.rise - height;
+    };
+    const double before = above(k - 1), after = above(k);  // < 0, > 0
+    const double share = std::clamp(before / (before - after), 0.0, 1.0);
+    const double travel = rays.facets[k - 1].travel +
+                          share * (static_cast<double>(rays.facets[k].travel) - rays.facets[k - 1].travel);
+    double u = rays.start.u + rays.direction.step_x * travel - rays.facets[k].column;
+    double v = rays.start.v + rays.direction.step_y * travel - rays.facets[k].row;
+    if (rays.transposed) std::swap(u, v);
+    return facet_part(kind, u, v, refinement);
+}
+
+void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<OperatorBundle>& bundles,
+                 const LineGroup& group, HitLines& lines, std::vector<PendingLink>& pending,
+                 LinkOperator& counts) {
+    constexpr uint32_t nothing = ~0u;
+    const int width = group.transposed ? tile.area.height : tile.area.width, words = words_for(width);
+    const uint32_t n_slots = static_cast<uint32_t>(tile.n_slots());
+    for (const OperatorBundle& bundle : bundles) {
+        if (bundle.rays.transposed != group.transposed || bundle.kind != group.kind ||
+            bundle.part != group.part)
+            continue;
+        const int along = group.transposed ? tile.area.y0 : tile.area.x0,
+                  across = group.transposed ? tile.area.x0 : tile.area.y0;
+        march_hits(grid, bundle.rays, along, across + group.first_line, width, group.n_lines, lines);
+        counts.rays += static_cast<double>(width) * group.n_lines;
+        const float x = static_cast<float>(bundle.weight * bundle.direction.x),
+                    y = static_cast<float>(bundle.weight * bundle.direction.y),
+                    z = static_cast<float>(bundle.weight * bundle.direction.z);
+        for (int line = 0; line < group.n_lines; ++line) {
+            uint32_t seen = nothing, seen_slot = 0;
+            for (int word = 0; word < words; ++word) {
+                const size_t at = static_cast<size_t>(line) * words + word;
+                for (uint32_t left = lines.hit[at]; left != 0; left &= left - 1) {
+                    const int lane = std::countr_zero(left), position = word * march_block + lane;
+                    const int k = lines.crossing[at * march_block + lane];
+                    const CrossedFacet& facet = bundle.rays.facets[k];
+                    const int column = group.transposed ? group.first_line + line : position;
+                    const int row = group.transposed ? position : group.first_line + line;
+                    int hit_column, hit_row;
+                    if (hit_cell(tile, column + (group.transposed ? facet.row : facet.column),
+                                 row + (group.transposed ? facet.column : facet.row), hit_column, hit_row)) {
+                        const int kind = group.transposed ? 1 - facet.kind : facet.kind;
+                        seen_slot = static_cast<uint32_t>(tile.slot(kind, hit_row, hit_column));
+                        seen = seen_slot;
+                        if (tile.refinement > 1)
+                            seen += n_slots *
+                                    static_cast<uint32_t>(hit_part(
+                                        grid, bundle, into_period(tile.area.x0 + column, tile.nx),
+                                        into_period(tile.area.y0 + row, tile.ny), k, tile.refinement, kind));
+                    } else if (seen == nothing) {
+                        counts.dropped += 1;
+                        continue;
+                    } else {
+                        counts.substituted +=
+                            1;  // what the last ray of this direction saw stands in for what this one would
+                    }
+                    const size_t slot = tile.slot(group.kind, row, column);
+                    const float cosine =
+                        x * tile.normal_x[slot] + y * tile.normal_y[slot] + z * tile.normal_z[slot];
+                    const float weight =
+                        std::max(0.0f, cosine) * tile.sqrt_area[slot] / tile.sqrt_area[seen_slot];
+                    pending.push_back({static_cast<uint32_t>(line * width + position), {seen, weight}});
+                }
+            }
+        }
+    }
+}
+
+// Groups the pending links by the unknown they start from (counting sort, stable: the order of the directions
+// stays).
+void append_records(const Tile& tile, const LineGroup& group, const std::vector<PendingLink>& pending,
+                    LinkOperator::Chunk& chunk) {
+    const int width = group.transposed ? tile.area.height : tile.area.width;
+    std::vector<uint32_t> place(static_cast<size_t>(width) * group.n_lines, 0);
+    for (const PendingLink& p : pending) ++place[p.start];
+    uint32_t end = static_cast<uint32_t>(chunk.links.size());
+    for (int line = 0; line < group.n_lines; ++line)
+        for (int position = 0; position < width; ++position) {
+            uint32_t& count = place[static_cast<size_t>(line) * width + position];
+            const uint32_t begin = end;
+            end += count;
+            if (count > 0) {
+                const int row = group.transposed ? position : group.first_line + line,
+                          column = group.transposed ? group.first_line + line : position;
+                chunk.records.push_back(
+                    {static_cast<uint32_t>(group.part * tile.n_slots() + tile.slot(group.kind, row, column)),
+                     begin});
+            }
+            count = begin;  // from now on: where the next link goes
+        }
+    chunk.links.resize(end);
+    for (const PendingLink& p : pending) chunk.links[place[p.start]++] = p.link;
+}
+
+}  // namespace
+
+LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const DirectionSet& set,
+                                 const std::vector<SubSample>& jitter, int n_threads,
+                                 const Monitor& monitor) {
+    const int n_directions = static_cast<int>(set.directions.size()), n_parts = tile.n_parts();
+    std::vector<OperatorBundle> bundles(2 * static_cast<size_t>(n_directions));
+    parallel_for(2 * n_directions, n_threads, [&](int task) {
+        const int i = task / 2, kind = task % 2, part = i % n_parts;
+        const FacetPoint point = facet_point(kind, jitter[i].a, jitter[i].b, tile.refinement, part);
+        bundles[task] = {make_ray_bundle(grid, set.directions[i], point, max_march_travel), set.directions[i],
+                         set.solid_angle[i] * n_parts / (2 * pi), kind, part};
+    });
+
+    constexpr int lines_together = 4;
+    std::vector<LineGroup> groups;
+    for (const bool transposed : {false, true})
+        for (int part = 0; part < n_parts; ++part)
+            for (int kind = 0; kind < 2; ++kind) {
+                const int n_lines = transposed ? tile.area.width : tile.area.height;
+                if (transposed && !grid.has_transposed()) continue;
+                for (int line = 0; line < n_lines; line += lines_together)
+                    groups.push_back(
+                        {transposed, kind, part, line, std::min(lines_together, n_lines - line)});
+            }
+
+    LinkOperator op;
+    constexpr int groups_per_chunk = 16;
+    const int n_chunks = static_cast<int>((groups.size() + groups_per_chunk - 1) / groups_per_chunk);
+    op.chunks.resize(n_chunks);
+    std::vector<LinkOperator> counts(n_chunks);
+    parallel_for(n_chunks, n_threads, [&](int c) {
+        monitor.check_cancelled();
+        HitLines lines;
+        std::vector<PendingLink> pending;
+        for (size_t g = static_cast<size_t>(c) * groups_per_chunk;
+             g < std::min(groups.size(), static_cast<size_t>(c + 1) * groups_per_chunk); ++g) {
+            pending.clear();
+            trace_group(grid, tile, bundles, groups[g], lines, pending, counts[c]);
+            append_records(tile, groups[g], pending, op.chunks[c]);
+        }
+        op.chunks[c].records.push_back({0, static_cast<uint32_t>(op.chunks[c].links.size())});
+    });
+    for (int c = 0; c < n_chunks; ++c) {
+        op.rays += counts[c].rays;
+        op.substituted += counts[c].substituted;
+        op.dropped += counts[c].dropped;
+        op.links += static_cast<double>(op.chunks[c].links.size());
+    }
+    return op;
+}
+
+void apply(const LinkOperator& op, const Fields& x, Fields& y, int n_threads) {
+    parallel_for(x.n_blocks(), n_threads, [&](int block) {
+        float* to = y.block(block);
+        std::fill_n(to, y.n_unknowns() * column_block, 0.0f);
+        for (const LinkOperator::Chunk& chunk : op.chunks)
+            apply_links(chunk.records.data(), chunk.records.size() - 1, chunk.links.data(), x.block(block),
+                        to);
+    });
+}
+
+}  // namespace gonio

@@ -1,0 +1,165 @@
+#include "visibility/crossings.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace gonio {
+namespace {
+
+constexpr double edge_margin = 1e-4;
+
+// Next crossings of one family of parallel grid lines: coordinate p(t) = p0 + rate t crosses integers at
+// first + k step.
+struct LineFamily {
+    double first, step;
+    LineFamily(double p0, double rate) {
+        constexpr double never = 1e300;
+        if (std::abs(rate) < 1e-9) {
+            first = never;
+            step = 0;
+        } else {
+            const double next = rate > 0 ? std::floor(p0 + 1e-7) + 1 : std::ceil(p0 - 1e-7) - 1;
+            first = (next - p0) / rate;
+            step = 1 / std::abs(rate);
+        }
+    }
+};
+
+struct RawCrossing {
+    double travel, weight;
+    int x0, y0, x1, y1;        // the edge's nodes
+    int cell_x, cell_y, kind;  // of the facet crossed before it
+};
+
+std::vector<RawCrossing> list_crossings(double u, double v, double dx, double dy, double max_travel) {
+    std::vector<RawCrossing> list;
+    const LineFamily vertical(u, dx), horizontal(v, dy), diagonal(u - v, dx - dy);
+    double next_v = vertical.first, next_h = horizontal.first, next_d = diagonal.first, previous = 0;
+    int n_v = 0, n_h = 0, n_d = 0;  // first + k step, and not repeated addition: no error builds up
+    for (;;) {
+        const double travel = std::min({next_v, next_h, next_d});
+        if (travel > max_travel) break;
+        const double x = u + dx * travel, y = v + dy * travel;
+        const double mid_x = u + dx * 0.5 * (travel + previous), mid_y = v + dy * 0.5 * (travel + previous);
+        RawCrossing c;
+        c.travel = travel;
+        c.cell_x = static_cast<int>(std::floor(mid_x));
+        c.cell_y = static_cast<int>(std::floor(mid_y));
+        c.kind = (mid_x - c.cell_x) >= (mid_y - c.cell_y) ? 0 : 1;
+        if (travel == next_v) {
+            c.x0 = c.x1 = static_cast<int>(std::lround(x));
+            c.y0 = static_cast<int>(std::floor(y + 1e-9));
+            c.y1 = c.y0 + 1;
+            c.weight = y - c.y0;
+            next_v = vertical.first + ++n_v * vertical.step;
+        } else if (travel == next_h) {
+            c.y0 = c.y1 = static_cast<int>(std::lround(y));
+            c.x0 = static_cast<int>(std::floor(x + 1e-9));
+            c.x1 = c.x0 + 1;
+            c.weight = x - c.x0;
+            next_h = horizontal.first + ++n_h * horizontal.step;
+        } else {
+            c.x0 = static_cast<int>(std::floor(x + 1e-9));
+            c.y0 = c.x0 - static_cast<int>(std::lround(x - y));
+            c.x1 = c.x0 + 1;
+            c.y1 = c.y0 + 1;
+            c.weight = x - c.x0;
+            next_d = diagonal.first + ++n_d * diagonal.step;
+        }
+        c.weight = std::clamp(c.weight, 0.0, 1.0);
+        list.push_back(c);
+        previous = travel;
+    }
+    return list;
+}
+
+// Greedy runs of crossings that fit a window. The first crossings are tested singly: most rays that hit do so
+// there.
+std::vector<CrossingGroup> group_crossings(const std::vector<RawCrossing>& list,
+                                           const std::vector<Crossing>& crossings, double rise, int nx,
+                                           int ny) {
+    constexpr int singly = 16;
+    std::vector<CrossingGroup> groups;
+    const int n = static_cast<int>(list.size());
+    int k = std::min(n, singly);
+    groups.push_back({k, -1, 0, 0, 0});
+    while (k < n) {
+        const int window = k < 3 * singly ? 0 : 1, size = window_size[window];
+        int x_min = list[k].x0, x_max = list[k].x1, y_min = list[k].y0, y_max = list[k].y1, end = k;
+        for (; end < n; ++end) {
+            const RawCrossing& c = list[end];
+            const int x_lo = std::min(x_min, c.x0), x_hi = std::max(x_max, c.x1);
+            const int y_lo = std::min(y_min, c.y0), y_hi = std::max(y_max, c.y1);
+            if (x_hi - x_lo > size || y_hi - y_lo > size) break;
+            x_min = x_lo, x_max = x_hi, y_min = y_lo, y_max = y_hi;
+        }
+        const float lowest = rise > 0 ? crossings[k].rise : crossings[end - 1].rise;
+        groups.push_back({end, window, wrap_index(x_min, nx), wrap_index(y_min, ny), lowest});
+        k = end;
+    }
+    return groups;
+}
+
+}  // namespace
+
+FacetPoint facet_point(int kind, double a, double b, int refinement, int part) {
+    double u = std::max(a, b), v = std::min(a, b);  // the square folded onto the triangle u >= v
+    if (refinement > 1) {
+        // Column p of the subdivision holds 2 p + 1 parts, so it starts at part p^2: for each q <= p the
+        // triangle below the diagonal of sub-cell (p, q), and for q < p the one above it.
+        const int p = static_cast<int>(std::sqrt(part + 0.5)), q = (part - p * p) / 2;
+        if ((part - p * p) % 2 != 0) std::swap(u, v);
+        u = (p + u) / refinement;
+        v = (q + v) / refinement;
+    }
+    u = std::clamp(u, 2 * edge_margin, 1 - edge_margin);
+    v = std::clamp(v, edge_margin, u - edge_margin);
+    return kind == 0 ? FacetPoint{0, u, v} : FacetPoint{1, 1 - u, 1 - v};
+}
+
+int facet_part(int kind, double u, double v, int refinement) {
+    if (kind == 1) u = 1 - u, v = 1 - v;
+    const double su = std::clamp(u, 0.0, 1.0) * refinement, sv = std::clamp(v, 0.0, 1.0) * refinement;
+    const int p = std::min(static_cast<int>(su), refinement - 1), q = std::min(static_cast<int>(sv), p);
+    const bool upper = p > q && (sv - q) > (su - p);
+    return p * p + 2 * q + (upper ? 1 : 0);
+}
+
+RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                          double max_travel) {
+    RayBundle bundle;
+    bundle.direction = to_march_direction(grid, direction);
+    bundle.start = start;
+    bundle.transposed =
+        grid.has_transposed() && std::abs(bundle.direction.step_y) > std::abs(bundle.direction.step_x);
+    if (bundle.transposed) {
+        std::swap(bundle.direction.step_x, bundle.direction.step_y);
+        bundle.start = {1 - start.kind, start.v, start.u};
+    }
+    const MarchPlane& plane = bundle.transposed ? grid.transposed : grid.rows;
+    const auto [kind, u, v] = bundle.start;
+    const auto [dx, dy, rise] = bundle.direction;
+    const double weights[2][3] = {{1 - u, u - v, v}, {1 - v, v - u, u}};
+    for (int k = 0; k < 3; ++k) bundle.start_weight[k] = static_cast<float>(weights[kind][k]);
+
+    // A rising ray is free once above the highest point, a falling one has hit once below the lowest.
+    const double range = static_cast<double>(grid.highest) - grid.lowest;
+    double travel = max_travel;
+    if (std::abs(rise) > 0) travel = std::min(max_travel, range / std::abs(rise) + 2);
+    bundle.truncated = travel == max_travel;
+    const std::vector<RawCrossing> list = list_crossings(u, v, dx, dy, travel);
+
+    bundle.crossings.reserve(list.size());
+    bundle.facets.reserve(list.size());
+    for (const RawCrossing& c : list) {
+        bundle.crossings.push_back({static_cast<float>(1 - c.weight), static_cast<float>(c.weight),
+                                    static_cast<float>(rise * c.travel), wrap_index(c.x0, plane.nx),
+                                    wrap_index(c.y0, plane.ny),
+                                    (c.y1 - c.y0) * plane.stride + (c.x1 - c.x0)});
+        bundle.facets.push_back({c.cell_x, c.cell_y, c.kind, static_cast<float>(c.travel)});
+    }
+    bundle.groups = group_crossings(list, bundle.crossings, rise, plane.nx, plane.ny);
+    return bundle;
+}
+
+}  // namespace gonio

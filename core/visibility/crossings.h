@@ -1,0 +1,69 @@
+// The list of grid-edge crossings that all parallel rays of one facet kind share (method of dependent tests,
+// Heidrich et al. 2000, sec. 3.1, taken to its end): rays that start at the same place inside their cells
+// pierce edges at the same relative positions, so where, with which weight and how high is computed once per
+// direction, in double, and not per ray.
+#pragma once
+#include <vector>
+
+#include "visibility/march_grid.h"
+
+namespace gonio {
+
+// A place inside a facet: (u, v) in cells from the cell's corner (i, j); facet kind 0 has u >= v, kind 1 v >
+// u.
+struct FacetPoint {
+    int kind = 0;
+    double u = 2.0 / 3, v = 1.0 / 3;
+};
+
+// The point of facet kind `kind` for (a, b) in the unit square, kept 1e-4 cell away from the facet's edges so
+// that no ray starts on one. The two kinds are each other's image under (u, v) -> (1 - u, 1 - v). refinement
+// r and part p: the p-th of the r^2 congruent parts of the facet (part 0 alone for r = 1).
+FacetPoint facet_point(int kind, double a, double b, int refinement = 1, int part = 0);
+
+// The part of a facet that holds (u, v), the inverse of facet_point's `part`.
+int facet_part(int kind, double u, double v, int refinement);
+
+// One edge crossing. Columns and rows are relative to the ray's own cell, in [0, n); height along the edge at
+// the crossing is weight0 * h[first node] + weight1 * h[first node + second_node]; `rise` is how far the ray
+// has risen.
+struct Crossing {
+    float weight0, weight1, rise;
+    int column, row;  // of the first node
+    int second_node;  // floats from the first node to the second
+};
+
+// The facet that a ray crosses just before crossing k: where it has hit if crossing k is the first below the
+// relief.
+struct CrossedFacet {
+    int column, row;  // of the cell, relative to the ray's cell, unwrapped (how far the hit is)
+    int kind;
+    float travel;  // cells from the start to crossing k
+};
+
+// A run of crossings whose nodes lie inside one window: skipped together when the window's maximum is below
+// all rays.
+struct CrossingGroup {
+    int end;            // one past the last crossing
+    int window;         // index of window_max, -1: test singly
+    int column, row;    // of the window
+    float lowest_rise;  // of the ray inside the window
+};
+
+struct RayBundle {
+    FacetPoint start;
+    MarchDirection direction;
+    bool transposed = false;     // columns and rows swapped: marches in MarchGrid::transposed
+    float start_weight[3] = {};  // of the nodes (i, j), the kind's own corner, (i+1, j+1)
+    std::vector<Crossing> crossings;
+    std::vector<CrossedFacet> facets;  // parallel to crossings
+    std::vector<CrossingGroup> groups;
+    bool truncated = false;  // longer than max_travel: rays may still be inside the relief at its end
+};
+
+// start.kind and start.u, v are in untransposed coordinates; the bundle holds transposed ones where it
+// marches transposed. max_travel: cells after which a nearly horizontal ray is given up (counted as a miss).
+RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                          double max_travel);
+
+}  // namespace gonio

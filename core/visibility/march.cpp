@@ -1,0 +1,326 @@
+// Kernels of the lockstep march; this file is compiled once for every instruction set (Highway's
+// foreach_target).
+#include "visibility/march.h"
+
+#include <algorithm>
+#include <cstring>
+#include <string>
+
+#include "base/bits.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "visibility/march.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace gonio {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+using D = hn::ScalableTag<float>;
+using DI = hn::RebindToSigned<D>;
+using VF = hn::Vec<D>;
+using VI = hn::Vec<DI>;
+using M = hn::Mask<D>;
+
+// Two vectors march together: enough for the latency of the fused multiply-adds, few enough to stop early.
+struct Block {
+    const MarchPlane* plane;
+    const RayBundle* bundle;
+    float highest;
+    int row, column;  // of the block's first lane; lanes beyond nx read the padding
+    int lane;         // first lane inside the 32
+};
+
+HWY_INLINE const float* node_at(const MarchPlane& plane, const std::vector<float>& nodes, const Block& b,
+                                int column, int row) {
+    int r = b.row + row, c = b.column + column;
+    r -= r >= plane.ny ? plane.ny : 0;
+    c -= c >= plane.nx ? plane.nx : 0;
+    return nodes.data() + static_cast<size_t>(r) * plane.stride + c + b.lane;
+}
+
+// Height of the start points, and which rays leave the front of their facet.
+HWY_INLINE void start_rays(const Block& b, int offset, VF& height, M& front) {
+    const D d;
+    const MarchPlane& plane = *b.plane;
+    const RayBundle& bundle = *b.bundle;
+    const float* p =
+        plane.heights.data() + static_cast<size_t>(b.row) * plane.stride + b.column + b.lane + offset;
+    const VF h00 = hn::LoadU(d, p), h10 = hn::LoadU(d, p + 1), h01 = hn::LoadU(d, p + plane.stride),
+             h11 = hn::LoadU(d, p + plane.stride + 1);
+    const bool lower = bundle.start.kind == 0;
+    const VF own = lower ? h10 : h01;
+    const VF gradient_x = lower ? hn::Sub(h10, h00) : hn::Sub(h11, h01);
+    const VF gradient_y = lower ? hn::Sub(h11, h10) : hn::Sub(h01, h00);
+    height = hn::MulAdd(h00, hn::Set(d, bundle.start_weight[0]),
+                        hn::MulAdd(own, hn::Set(d, bundle.start_weight[1]),
+                                   hn::Mul(h11, hn::Set(d, bundle.start_weight[2]))));
+    const VF facing =
+        hn::NegMulAdd(gradient_x, hn::Set(d, static_cast<float>(bundle.direction.step_x)),
+                      hn::NegMulAdd(gradient_y, hn::Set(d, static_cast<float>(bundle.direction.step_y)),
+                                    hn::Set(d, static_cast<float>(bundle.direction.rise))));
+    front = hn::Gt(facing, hn::Zero(d));
+}
+
+HWY_INLINE uint32_t mask_bits(M mask) {
+    uint8_t bytes[8] = {};
+    hn::StoreMaskBits(D(), mask, bytes);
+    uint32_t bits;
+    std::memcpy(&bits, bytes, 4);
+    return bits;
+}
+
+// Marches 2 vectors of rays; returns front and hit lanes as bits and, where asked, the crossing behind each
+// hit.
+template <bool kWantCrossing>
+HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_bits, int32_t* crossing) {
+    const D d;
+    const DI di;
+    const int lanes = static_cast<int>(hn::Lanes(d));
+    const MarchPlane& plane = *b.plane;
+    const RayBundle& bundle = *b.bundle;
+    const bool rising = bundle.direction.rise > 0;
+    VF height0, height1;
+    M active0, active1;
+    start_rays(b, 0, height0, active0);
+    start_rays(b, lanes, height1, active1);
+    const M front0 = active0, front1 = active1;
+    VI at0 = hn::Zero(di), at1 = hn::Zero(di);
+    const VF top = hn::Set(d, b.highest);
+
+    if (!hn::AllFalse(d, hn::Or(active0, active1))) {
+        int k = 1;  // crossing 0 is the edge of the ray's own facet
+        for (const CrossingGroup& group : bundle.groups) {
+            if (group.window >= 0) {
+                const VF rise = hn::Set(d, group.lowest_rise);
+                const VF ray0 = hn::Add(height0, rise), ray1 = hn::Add(height1, rise);
+                if (rising && hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(top, ray0)),
+                                                     hn::And(active1, hn::Gt(top, ray1)))))
+                    break;
+                const float* w = node_at(plane, plane.window_max[group.window], b, group.column, group.row);
+                const M need = hn::Or(hn::And(active0, hn::Gt(hn::LoadU(d, w), ray0)),
+                                      hn::And(active1, hn::Gt(hn::LoadU(d, w + lanes), ray1)));
+                if (hn::AllFalse(d, need)) {
+                    k = group.end;
+                    continue;
+                }
+            }
+            bool done = false;
+            for (; k < group.end; ++k) {
+                const Crossing& c = bundle.crossings[k];
+                const float* p = node_at(plane, plane.heights, b, c.column, c.row);
+                const float* q = p + c.second_node;
+                const VF w0 = hn::Set(d, c.weight0), w1 = hn::Set(d, c.weight1), rise = hn::Set(d, c.rise);
+                const VF edge0 = hn::MulAdd(hn::LoadU(d, q), w1, hn::MulSub(hn::LoadU(d, p), w0, rise));
+                const VF edge1 =
+                    hn::MulAdd(hn::LoadU(d, q + lanes), w1, hn::MulSub(hn::LoadU(d, p + lanes), w0, rise));
+                const M above0 = hn::Gt(edge0, height0), above1 = hn::Gt(edge1, height1);
+                if constexpr (kWantCrossing) {
+                    const VI index = hn::Set(di, k);
+                    at0 = hn::IfThenElse(hn::RebindMask(di, hn::And(active0, above0)), index, at0);
+                    at1 = hn::IfThenElse(hn::RebindMask(di, hn::And(active1, above1)), index, at1);
+                }
+                active0 = hn::AndNot(above0, active0);
+                active1 = hn::AndNot(above1, active1);
+                if (hn::AllFalse(d, hn::Or(active0, active1))) {
+                    done = true;
+                    break;
+                }
+                if (rising && (k & 7) == 7) {
+                    const VF left = hn::Sub(top, rise);
+                    if (hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(left, height0)),
+                                               hn::And(active1, hn::Gt(left, height1))))) {
+                        done = true;
+                        break;
+                    }
+                }
+            }
+            if (done) break;
+        }
+    }
+    front_bits = mask_bits(front0) | mask_bits(front1) << lanes;
+    hit_bits = front_bits & ~(mask_bits(active0) | mask_bits(active1) << lanes);
+    if constexpr (kWantCrossing) {
+        hn::StoreU(at0, di, crossing);
+        hn::StoreU(at1, di, crossing + lanes);
+    }
+}
+
+HWY_INLINE uint32_t tail_mask(int width, int word) {
+    const int left = width - word * march_block;
+    return left >= march_block ? ~0u : (1u << left) - 1;
+}
+
+void march_lines(const MarchPlane& plane, const RayBundle& bundle, float highest, int column, int row,
+                 int width, int n_lines, uint32_t* front, uint32_t* hit, int32_t* crossing) {
+    const int step = 2 * static_cast<int>(hn::Lanes(D())), words = words_for(width);
+    for (int line = 0; line < n_lines; ++line)
+        for (int word = 0; word < words; ++word) {
+            Block b{
+                &plane, &bundle, highest, (row + line) % plane.ny, (column + word * march_block) % plane.nx,
+                0};
+            uint32_t all_front = 0, all_hit = 0;
+            const size_t at = static_cast<size_t>(line) * words + word;
+            for (; b.lane < march_block; b.lane += step) {
+                uint32_t f, h;
+                if (crossing)
+                    march_pair<true>(b, f, h, crossing + at * march_block + b.lane);
+                else
+                    march_pair<false>(b, f, h, nullptr);
+                all_front |= f << b.lane;
+                all_hit |= h << b.lane;
+            }
+            front[at] = all_front & tail_mask(width, word);
+            hit[at] = all_hit & tail_mask(width, word);
+        }
+}
+
+void horizon_lines(const MarchPlane& plane, const RayBundle& bundle, float highest, int column, int row,
+                   int width, int n_lines, float* slope) {
+    const D d;
+    const int lanes = static_cast<int>(hn::Lanes(d)), words = words_for(width);
+    const VF top = hn::Set(d, highest);
+    for (int line = 0; line < n_lines; ++line)
+        for (int word = 0; word < words; ++word) {
+            Block b{
+                &plane, &bundle, highest, (row + line) % plane.ny, (column + word * march_block) % plane.nx,
+                0};
+            for (; b.lane < march_block; b.lane += lanes) {
+                VF height, best = hn::Zero(d);
+                M front;
+                start_rays(b, 0, height, front);
+                const VF headroom = hn::Sub(top, height);
+                int k = 0;
+                for (const CrossingGroup& group : bundle.groups) {
+                    const VF inverse = hn::Set(d, 1 / bundle.facets[k].travel);
+                    if (hn::AllFalse(d, hn::Gt(hn::Mul(headroom, inverse), best))) break;
+                    if (group.window >= 0) {
+                        const float* w =
+                            node_at(plane, plane.window_max[group.window], b, group.column, group.row);
+                        if (hn::AllFalse(d,
+                                         hn::Gt(hn::Mul(hn::Sub(hn::LoadU(d, w), height), inverse), best))) {
+                            k = group.end;
+                            continue;
+                        }
+                    }
+                    for (; k < group.end; ++k) {
+                        const Crossing& c = bundle.crossings[k];
+                        const float* p = node_at(plane, plane.heights, b, c.column, c.row);
+                        const VF edge = hn::MulAdd(hn::LoadU(d, p + c.second_node), hn::Set(d, c.weight1),
+                                                   hn::Mul(hn::LoadU(d, p), hn::Set(d, c.weight0)));
+                        best = hn::Max(
+                            best, hn::Mul(hn::Sub(edge, height), hn::Set(d, 1 / bundle.facets[k].travel)));
+                    }
+                }
+                hn::StoreU(best, d,
+                           slope + (static_cast<size_t>(line) * words + word) * march_block + b.lane);
+            }
+        }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace gonio
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace gonio {
+namespace {
+
+HWY_EXPORT(march_lines);
+HWY_EXPORT(horizon_lines);
+
+const MarchPlane& plane_of(const MarchGrid& grid, const RayBundle& bundle) {
+    return bundle.transposed ? grid.transposed : grid.rows;
+}
+
+}  // namespace
+
+void march_visible(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, uint32_t* visible) {
+    const MarchPlane& plane = plane_of(grid, bundle);
+    const int words = words_for(rect.width);
+    if (!bundle.transposed) {
+        std::vector<uint32_t> hit(static_cast<size_t>(words) * rect.height);
+        HWY_DYNAMIC_DISPATCH(march_lines)
+        (plane, bundle, grid.highest, rect.x0, rect.y0, rect.width, rect.height, visible, hit.data(),
+         nullptr);
+        for (size_t k = 0; k < hit.size(); ++k) visible[k] &= ~hit[k];
+        return;
+    }
+    const int turned_words = words_for(rect.height);
+    std::vector<uint32_t> front(static_cast<size_t>(turned_words) * rect.width), hit(front.size());
+    HWY_DYNAMIC_DISPATCH(march_lines)
+    (plane, bundle, grid.highest, rect.y0, rect.x0, rect.height, rect.width, front.data(), hit.data(),
+     nullptr);
+    uint32_t square[32];
+    for (int word = 0; word < words; ++word)
+        for (int turned = 0; turned < turned_words; ++turned) {
+            const int columns = std::min(march_block, rect.width - word * march_block);
+            const int rows = std::min(march_block, rect.height - turned * march_block);
+            for (int c = 0; c < march_block; ++c) {
+                const size_t at = static_cast<size_t>(word * march_block + c) * turned_words + turned;
+                square[c] = c < columns ? front[at] & ~hit[at] : 0;
+            }
+            transpose_bits(square);
+            for (int r = 0; r < rows; ++r)
+                visible[static_cast<size_t>(turned * march_block + r) * words + word] = square[r];
+        }
+}
+
+void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int row, int width, int n_lines,
+                HitLines& out) {
+    const size_t words = static_cast<size_t>(words_for(width)) * n_lines;
+    out.front.resize(words);
+    out.hit.resize(words);
+    out.crossing.resize(words * march_block);
+    HWY_DYNAMIC_DISPATCH(march_lines)
+    (plane_of(grid, bundle), bundle, grid.highest, column, row, width, n_lines, out.front.data(),
+     out.hit.data(), out.crossing.data());
+}
+
+void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect,
+                   float* horizon_slope) {
+    const int lines = bundle.transposed ? rect.width : rect.height,
+              length = bundle.transposed ? rect.height : rect.width;
+    const int padded = words_for(length) * march_block;
+    std::vector<float> slope(static_cast<size_t>(lines) * padded);
+    HWY_DYNAMIC_DISPATCH(horizon_lines)
+    (plane_of(grid, bundle), bundle, grid.highest, bundle.transposed ? rect.y0 : rect.x0,
+     bundle.transposed ? rect.x0 : rect.y0, length, lines, slope.data());
+    // Heights are in pitch_x and travel in cells: a cell of travel is hypot(pitch_x step_x, pitch_y step_y)
+    // long.
+    const double step_x = bundle.transposed ? bundle.direction.step_y : bundle.direction.step_x;
+    const double step_y = bundle.transposed ? bundle.direction.step_x : bundle.direction.step_y;
+    const float metric =
+        static_cast<float>(grid.pitch_x / std::hypot(step_x * grid.pitch_x, step_y * grid.pitch_y));
+    for (int r = 0; r < rect.height; ++r)
+        for (int c = 0; c < rect.width; ++c)
+            horizon_slope[static_cast<size_t>(r) * rect.width + c] =
+                metric * slope[bundle.transposed ? static_cast<size_t>(c) * padded + r
+                                                 : static_cast<size_t>(r) * padded + c];
+}
+
+const char* simd_target() {
+    const int64_t supported = hwy::SupportedTargets() & HWY_TARGETS;
+    return hwy::TargetName(supported & -supported);  // the lowest bit is the best target
+}
+
+bool force_simd_target(const char* name) {
+    hwy::SetSupportedTargetsForTest(0);
+    if (std::string(name).empty()) {
+        hwy::GetChosenTarget().DeInit();
+        return true;
+    }
+    for (int64_t left = hwy::SupportedTargets() & HWY_TARGETS; left != 0; left &= left - 1) {
+        const int64_t target = left & -left;
+        if (std::string(name) != hwy::TargetName(target)) continue;
+        hwy::SetSupportedTargetsForTest(target);
+        hwy::GetChosenTarget().DeInit();
+        return true;
+    }
+    return false;
+}
+
+}  // namespace gonio
+#endif  // HWY_ONCE
