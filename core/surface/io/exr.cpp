@@ -8,9 +8,11 @@
 #include <ImfIO.h>
 #include <ImfInputFile.h>
 #include <ImfStringAttribute.h>
-#include <ImfTestFile.h>
+#include <ImfTileDescription.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "base/units.h"
 #include "surface/io/formats.h"
@@ -68,18 +70,71 @@ std::optional<double> metres_attribute(const FileBytes& file, const Imf::Header&
     return value;
 }
 
-RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
-    MemoryStream stream(file);
-    Imf::InputFile input(stream, 0);
-    const Imf::Header& header = input.header();
+constexpr std::string_view magic("\x76\x2f\x31\x01", 4);
+constexpr size_t header_start = 8;  // after magic and version
+constexpr uint32_t tiled_flag = 0x200, deep_flag = 0x800, multi_part_flag = 0x1000;
+
+// Walks the attributes (name, type, size, value) without reading them: OpenEXR allocates a value's stated
+// size before it looks whether the file has so many bytes.
+void check_attribute_sizes(const FileBytes& file) {
+    size_t position = header_start;
+    auto skip_name = [&] {
+        const size_t end = file.bytes.find('\0', position);
+        if (end == std::string_view::npos) refuse(file, "", "damaged OpenEXR: the header has no end");
+        const bool empty = end == position;
+        position = end + 1;
+        return !empty;
+    };
+    while (skip_name()) {
+        skip_name();
+        if (file.bytes.size() - position < 4) refuse(file, "", "damaged OpenEXR: the header has no end");
+        const auto size = load<uint32_t>(&file.bytes[position], false);
+        position += 4;
+        if (size > file.bytes.size() - position)
+            refuse(file, "", "damaged OpenEXR: an attribute is larger than the file");
+        position += size;
+    }
+}
+
+// Before the library opens the file: the image, the buffers that it decodes into (up to 256 lines, or a tile,
+// of all channels) and the table of tiles must be in proportion to the file.
+void check_header(const FileBytes& file, const Imf::Header& header, bool tiled, const ReadLimits& limits) {
     const auto& window = header.dataWindow();
     const long long nx = 1LL + window.max.x - window.min.x, ny = 1LL + window.max.y - window.min.y;
     // The best that a compressor of OpenEXR does is DWA: one half per 8 x 8 block, deflated.
     constexpr double best_ratio = 1032 * 64;
     check_extents(file, nx, ny, limits, 2 / best_ratio, file.bytes.size());
 
+    double channels = 0;
+    for (auto c = header.channels().begin(); c != header.channels().end(); ++c) ++channels;
+    double buffer = 4 * channels * 256 * static_cast<double>(nx);
+    if (tiled) {
+        const double tile_nx = header.tileDescription().xSize, tile_ny = header.tileDescription().ySize;
+        buffer = 4 * channels * std::max(tile_nx, static_cast<double>(nx)) * tile_ny;
+        const double tiles =
+            std::ceil(static_cast<double>(nx) / tile_nx) * std::ceil(static_cast<double>(ny) / tile_ny);
+        if (!(8 * tiles <= static_cast<double>(file.bytes.size())))
+            refuse(file, "", "damaged OpenEXR: more tiles than the file can hold");
+    }
+    if (!(buffer <= std::max(0x1p27, 1000 * static_cast<double>(file.bytes.size()))))
+        refuse(file, std::to_string(nx) + " points wide",
+               "the lines or tiles are too large for a file of this size");
+}
+
+RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
+    int version = load<int32_t>(&file.bytes[4], false);
+    if (version & deep_flag) refuse(file, "deep data", "a height map must be flat");
+    if (version & multi_part_flag) refuse(file, "several parts", "a height map must be a single part");
+    check_attribute_sizes(file);
+    MemoryStream stream(file);
+    stream.seekg(header_start);
+    Imf::Header header;
+    header.readFrom(stream, version);
+    check_header(file, header, version & tiled_flag, limits);
+
+    const auto& window = header.dataWindow();
     RawHeights heights;
-    heights.nx = static_cast<int>(nx), heights.ny = static_cast<int>(ny);
+    heights.nx = window.max.x - window.min.x + 1, heights.ny = window.max.y - window.min.y + 1;
     heights.row0_at_top = true;
     const std::string channel = height_channel(file, header.channels());
     if (header.channels()[channel].type == Imf::HALF)
@@ -88,10 +143,12 @@ RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
     heights.pitch_y = metres_attribute(file, header, "pixelPitchY_m");
     heights.height_unit = metres_attribute(file, header, "heightUnit_m");
 
-    std::vector<float> pixels(static_cast<size_t>(nx) * ny);
+    std::vector<float> pixels(static_cast<size_t>(heights.nx) * heights.ny);
     Imf::FrameBuffer frame;
-    frame.insert(channel,
-                 Imf::Slice::Make(Imf::FLOAT, pixels.data(), window, sizeof(float), sizeof(float) * nx));
+    frame.insert(channel, Imf::Slice::Make(Imf::FLOAT, pixels.data(), window, sizeof(float),
+                                           sizeof(float) * heights.nx));
+    stream.seekg(0);
+    Imf::InputFile input(stream, 0);
     input.setFrameBuffer(frame);
     input.readPixels(window.min.y, window.max.y);
     heights.values.assign(pixels.begin(), pixels.end());
@@ -101,17 +158,9 @@ RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
 }  // namespace
 
 RawHeights read_exr(const FileBytes& file, const ReadLimits& limits) {
-    constexpr std::string_view magic("\x76\x2f\x31\x01", 4);
-    if (!file.bytes.starts_with(magic)) refuse(file, "", "is not an OpenEXR file: its first bytes are wrong");
-    // Before any decoding: the library refuses headers beyond these by itself.
-    Imf::Header::setMaxImageSize(1 << 24, 1 << 24);
-    Imf::Header::setMaxTileSize(1 << 13, 1 << 13);
+    if (!file.bytes.starts_with(magic) || file.bytes.size() < header_start)
+        refuse(file, "", "is not an OpenEXR file: its first bytes are wrong");
     try {
-        MemoryStream stream(file);
-        bool tiled = false, deep = false, multi_part = false;
-        Imf::isOpenExrFile(stream, tiled, deep, multi_part);
-        if (deep) refuse(file, "deep data", "a height map must be flat");
-        if (multi_part) refuse(file, "several parts", "a height map must be a single part");
         return read_part(file, limits);
     } catch (const Error&) {
         throw;
