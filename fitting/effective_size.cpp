@@ -42,12 +42,23 @@ struct Spectrum {
     }
 };
 
+// Whether the columns (rows) are their own mirror image, as the mirror boundary makes them: the second half
+// tells nothing new.
+bool is_mirrored(const HeightField& s, bool along_x) {
+    const int n = along_x ? s.nx : s.ny, n_across = along_x ? s.ny : s.nx;
+    if (n < 2 || n % 2 != 0) return false;
+    for (int a = 0; a < n_across; ++a)
+        for (int k = 0; k < n / 2; ++k)
+            if (along_x ? s.at(k, a) != s.at(n - 1 - k, a) : s.at(a, k) != s.at(a, n - 1 - k)) return false;
+    return true;
+}
+
 // Differences along the edges of the cells: each is p of one lower and one upper facet, or q of one of each
 // kind.
 Spectrum slope_spectrum(const HeightField& s, double rotation) {
     Spectrum spectrum;
-    spectrum.nx = smooth_size(s.nx - 2 * s.border_x);
-    spectrum.ny = smooth_size(s.ny - 2 * s.border_y);
+    spectrum.nx = smooth_size(is_mirrored(s, true) ? s.nx / 2 : s.nx - 2 * s.border_x);
+    spectrum.ny = smooth_size(is_mirrored(s, false) ? s.ny / 2 : s.ny - 2 * s.border_y);
     const int nx = spectrum.nx, ny = spectrum.ny;
     std::vector<Complex>& z = spectrum.z;
     z.resize(static_cast<size_t>(nx) * ny);

@@ -151,7 +151,11 @@ NdfFit fit_model(const std::vector<SlopeCell>& cells, const SlopeCell& mean, Ndf
     // line.
     const double smallest =
         dimension == 1 ? std::max(fit.alpha_x, fit.alpha_y) : std::min(fit.alpha_x, fit.alpha_y);
-    const bool is_spike = !(smallest > 1e-6);
+    if (!(smallest > 1e-6)) {
+        return {.model = model,
+                .isotropic = isotropic,
+                .message = "the likelihood has no maximum: too many facets share one slope"};
+    }
     fit.alpha_x *= scale;
     fit.alpha_y *= scale;
     fit.alpha = dimension == 1 && !isotropic ? std::max(fit.alpha_x, fit.alpha_y)
@@ -164,12 +168,11 @@ NdfFit fit_model(const std::vector<SlopeCell>& cells, const SlopeCell& mean, Ndf
     fit.aic = 2 * static_cast<double>(x.size()) - 2 * fit.log_likelihood;
     set_standard_errors(fit, dimension, n_effective);
     if (dimension == 1 && !isotropic) fit.se_alpha = std::max(fit.se_alpha_x, fit.se_alpha_y);
-    fit.converged = summary.termination_type == ceres::CONVERGENCE && !is_spike;
-    fit.message = fit.converged ? (dimension == 1 && !isotropic
-                                       ? "all slopes lie along one axis: fitted to the marginal along it"
-                                       : "converged")
-                  : is_spike    ? "the likelihood has no maximum: too many facets share one slope"
-                                : "not converged: " + summary.message;
+    fit.converged = summary.termination_type == ceres::CONVERGENCE;
+    fit.message = !fit.converged ? "not converged: " + summary.message
+                  : dimension == 1 && !isotropic
+                      ? "all slopes lie along one axis: fitted to the marginal along it"
+                      : "converged";
     return fit;
 }
 

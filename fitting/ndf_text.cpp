@@ -23,7 +23,7 @@ std::string ndf_text(const NdfResult& r) {
              << name_of(fit.model) << std::setw(13) << (fit.isotropic ? "isotropic" : "anisotropic");
         text << std::setprecision(4);
         auto pair = [&](double value, double error) {
-            text << std::left << std::setw(10) << value << std::setw(11) << error;
+            text << std::left << std::setw(11) << value << std::setw(11) << error;
         };
         pair(fit.alpha_x, fit.se_alpha_x);
         pair(fit.alpha_y, fit.se_alpha_y);

@@ -26,7 +26,8 @@ double Scale::place(double value) const {
 std::vector<double> ticks(const Scale& scale, int count) {
     std::vector<double> values;
     const double slack = 1e-9;
-    if (!scale.is_log) {
+    if (!scale.is_log ||
+        scale.high < 5 * scale.low) {  // a short stretch of a logarithm has few powers of ten
         const double step = nice_step((scale.high - scale.low) / count);
         for (double k = std::ceil(scale.low / step - slack); k * step <= scale.high + slack * step; ++k)
             values.push_back(k * step);
@@ -49,7 +50,7 @@ std::vector<double> ticks(const Scale& scale, int count) {
 std::string tick_label(double value) {
     if (value == 0) return "0";
     const double size = std::abs(value);
-    if (size >= 1e-3 && size < 1e5) return number_text(value, 4);
+    if (size >= 1e-3 && size < 1e4) return number_text(value, 4);
     const int exponent = static_cast<int>(std::floor(std::log10(size) + 1e-9));
     const double mantissa = value / std::pow(10, exponent);
     static const char* raised[] = {"\u2070", "\u00b9", "\u00b2", "\u00b3", "\u2074",

@@ -110,7 +110,10 @@ void Canvas::image(const std::vector<uint32_t>& pixels, int width, int height, P
     cairo_translate(cairo_.context, corner.x, corner.y);
     cairo_scale(cairo_.context, w / width, h / height);
     cairo_set_source_surface(cairo_.context, source, 0, 0);
-    cairo_paint(cairo_.context);
+    // Padded and cut, or the last pixels would fade into nothing.
+    cairo_pattern_set_extend(cairo_get_source(cairo_.context), CAIRO_EXTEND_PAD);
+    cairo_rectangle(cairo_.context, 0, 0, width, height);
+    cairo_fill(cairo_.context);
     cairo_restore(cairo_.context);
     cairo_surface_destroy(source);
 }

@@ -45,10 +45,13 @@ std::vector<Lobe> choose_lobes(const Table& table, int map_incident) {
         }
         return lobes;
     }
+    bool has_pole = false;
     std::vector<int> candidates;  // of one azimuth, so that the diagram is one plane
     for (int i = 0; i < static_cast<int>(table.incident.size()) && table.incident.size() <= 4096; ++i) {
         const AnglesDeg& wi = table.incident[i];
-        if (wi.phi_deg != table.incident[map_incident].phi_deg && wi.theta_deg != 0) continue;
+        const bool is_pole = wi.theta_deg == 0 && !has_pole;  // grids hold normal incidence once an azimuth
+        if (!is_pole && (wi.theta_deg == 0 || wi.phi_deg != table.incident[map_incident].phi_deg)) continue;
+        has_pole |= is_pole;
         if (in_plane(samples_of(table, i, 0), wi).size() >= 2) candidates.push_back(i);
     }
     std::sort(candidates.begin(), candidates.end(),
@@ -124,7 +127,7 @@ void draw_lobes(Canvas& canvas, const Table& table, int map_incident, Point corn
     }
     double y = centre.y + 48;
     for (size_t k = 0; k < lobes.size(); ++k) {
-        const double x = corner.x + 16 + (k % 2) * 0.5 * width;
+        const double x = corner.x + 16 + (k % 2 == 1 ? 0.5 * width : 0);
         canvas.line({{x, y}, {x + 26, y}}, lobes[k].colour, 2, lobes[k].is_dashed);
         canvas.text({x + 33, y}, lobes[k].name, 11, ink);
         if (k % 2 == 1) y += 17;

@@ -71,20 +71,29 @@ SampleGrid as_grid(const std::vector<OutgoingSample>& samples) {
                                                                                              : grid;
 }
 
-// Scattered samples: inverse distances (power 4) to all samples on the disk, none further than three times
-// the mean spacing.
+// Scattered samples: the plane through the neighbours by weighted least squares (inverse distances alone
+// would draw a terrace around each sample). Nothing is drawn further from a sample than 1.5 times their mean
+// spacing.
 double scattered_value(const std::vector<OutgoingSample>& samples, const std::vector<Point>& places,
                        Point p) {
-    const double reach2 = 9 * pi / static_cast<double>(samples.size()) / pi;
-    double sum = 0, weights = 0, nearest = 10;
+    const double spacing2 = 1 / static_cast<double>(samples.size()), reach2 = 14 * spacing2;
+    double nearest = 10, s0 = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0, f0 = 0, fx = 0, fy = 0;
     for (size_t k = 0; k < samples.size(); ++k) {
         const double dx = places[k].x - p.x, dy = places[k].y - p.y, r2 = dx * dx + dy * dy;
         nearest = std::min(nearest, r2);
         if (r2 > reach2) continue;
-        const double fade = 1 - r2 / reach2, w = fade * fade / (r2 * r2 + 1e-12);
-        sum += w * samples[k].f, weights += w;
+        const double fade = 1 - r2 / reach2, w = fade * fade / (r2 + 0.3 * spacing2);
+        s0 += w, sx += w * dx, sy += w * dy, sxx += w * dx * dx, sxy += w * dx * dy, syy += w * dy * dy;
+        f0 += w * samples[k].f, fx += w * dx * samples[k].f, fy += w * dy * samples[k].f;
     }
-    return nearest > 0.5 * reach2 ? not_measured : sum / weights;
+    if (nearest > 6 * spacing2) return not_measured;
+    // Normal equations at p; a little ridge keeps one-sided neighbourhoods at the rim from extrapolating
+    // wildly.
+    sxx += 0.05 * s0 * spacing2, syy += 0.05 * s0 * spacing2;
+    const double cxx = syy * s0 - sy * sy, cxy = sx * sy - sxy * s0, c0 = sxy * sy - syy * sx;
+    const double det = sxx * cxx + sxy * cxy + sx * c0;
+    const double c01 = sx * sxy - sxx * sy, c00 = sxx * syy - sxy * sxy;
+    return det > 0 ? (c0 * fx + c01 * fy + c00 * f0) / det : f0 / s0;
 }
 
 Scale colour_scale(const std::vector<OutgoingSample>& samples, bool log_scale) {

@@ -351,6 +351,17 @@ TEST(NdfFitField, AfmSample) {
     EXPECT_GE(r.best, 0);
 }
 
+// Mirrored copies are no new facets: the errors stay those of the original.
+TEST(NdfFitField, MirroredCopiesAreNotCountedTwice) {
+    const HeightField s = generate_gaussian(128, 128, 1e-6, 4e-6, 0.5, 6);
+    std::vector<double> heights;
+    for (int j = 0; j < 256; ++j)
+        for (int i = 0; i < 256; ++i) heights.push_back(s.at(std::min(i, 255 - i), std::min(j, 255 - j)));
+    const double once = measure_ndf(s).fits[0].se_alpha;
+    const double mirrored = measure_ndf(make_height_field(256, 256, 1e-6, 1e-6, heights)).fits[0].se_alpha;
+    EXPECT_NEAR(mirrored / once, 1, 0.1);
+}
+
 TEST(NdfFitField, MillionsOfFacetsInSeconds) {
     const HeightField s = generate_gaussian(2048, 2048, 1e-6, 6e-6, 0.5, 1);
     const auto start = std::clock();
