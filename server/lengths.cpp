@@ -82,8 +82,8 @@ double parse_length(std::string_view text, const std::string& field) {
     }
     for (const LengthUnit& known : units) {
         if (unit != known.name) continue;
-        // The unit shifts the decimal exponent before the one rounding to double, so that "0.3 mm" and
-        // "0.0003 m" are the same bits and give the same job hash; 0.3 * 1e-3 would round twice.
+        // The unit shifts the decimal exponent before the one rounding to double, so that "0.9 mm" and
+        // "0.0009 m" are the same bits and give the same job hash; 0.9 * 1e-3 would round twice.
         const long long shifted = static_cast<long long>(exponent) + known.exponent;
         const std::string number = mantissa + "e" + std::to_string(shifted);
         double metres = 0;

@@ -16,10 +16,12 @@ std::string read_text(const std::string& path) {
     if (path == "-") return {std::istreambuf_iterator<char>(std::cin), {}};
     std::error_code failure;
     if (!std::filesystem::exists(path, failure)) throw Error(ErrorCode::not_found, path, "", "no such file");
+    if (std::filesystem::is_directory(path, failure)) {
+        throw Error(ErrorCode::invalid_input, path, "", "is a folder, not a file");
+    }
     std::ifstream in(path, std::ios::binary);
     std::string text{std::istreambuf_iterator<char>(in), {}};
-    if (!in || std::filesystem::is_directory(path, failure))
-        throw Error(ErrorCode::io, path, "", "cannot be read");
+    if (!in) throw Error(ErrorCode::io, path, "", "cannot be read");
     return text;
 }
 

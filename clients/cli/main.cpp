@@ -21,6 +21,21 @@ class ExamplesFirst : public CLI::Formatter {
     }
 };
 
+// "gonio: error: ..." and where to read on. CLI11 says of an unknown subcommand only that one is required.
+int usage_error(const CLI::App& app, const std::string& first_argument, const std::string& message) {
+    std::string names, help = "gonio --help";
+    bool is_unknown = !first_argument.empty() && first_argument[0] != '-';
+    for (const CLI::App* command : app.get_subcommands({})) {
+        names += (names.empty() ? "" : ", ") + command->get_name();
+        if (command->get_name() != first_argument) continue;
+        is_unknown = false;
+        help = "gonio " + first_argument + " --help";
+    }
+    gonio::print_error((is_unknown ? "\"" + first_argument + "\" is none of " + names : message) + " (see " +
+                       help + ")");
+    return gonio::exit_code(gonio::ErrorCode::usage);
+}
+
 int fail(const gonio::Error& error, const gonio::CommonOptions& common) {
     gonio::print_error(error.what());
     if (common.json) std::cout << gonio::failure_json(error) << std::endl;
@@ -52,13 +67,14 @@ int main(int argc, char** argv) {
     gonio::add_batch(app, common, action);
     gonio::add_info(app, common, action);
     gonio::add_reference(app, common, action);
+    gonio::add_plot(app, common, action);
+    gonio::add_ndf(app, common, action);
     gonio::add_schema(app, action);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
         if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-        gonio::print_error(std::string(error.what()) + " (see gonio --help)");
-        return gonio::exit_code(gonio::ErrorCode::usage);
+        return usage_error(app, argc > 1 ? argv[1] : "", error.what());
     }
     gonio::install_interrupt_handlers();
     try {
