@@ -60,7 +60,7 @@ std::string tick_label(double value) {
     return text;
 }
 
-Scale enclosing_scale(double low, double high, bool is_log) {
+Scale enclosing_scale(double low, double high, bool is_log, int count) {
     if (is_log) {
         if (high / low < 1.5) low /= 1.5, high *= 1.5;
         const double slack = 1e-9;
@@ -71,7 +71,7 @@ Scale enclosing_scale(double low, double high, bool is_log) {
         const double pad = high != 0 ? 0.1 * std::abs(high) : 1;
         low -= pad, high += pad;
     }
-    const double step = nice_step((high - low) / 5);
+    const double step = nice_step((high - low) / count);
     return {std::floor(low / step + 1e-9) * step, std::ceil(high / step - 1e-9) * step, false};
 }
 

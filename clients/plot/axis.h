@@ -19,7 +19,7 @@ std::vector<double> ticks(const Scale& scale, int count);
 // Short: "0.25", "1e-05" as 10 with a raised exponent.
 std::string tick_label(double value);
 
-// Scale that holds all values, rounded outwards to ticks.
-Scale enclosing_scale(double low, double high, bool is_log);
+// Scale that holds all values, rounded outwards to the ticks that `count` asks for.
+Scale enclosing_scale(double low, double high, bool is_log, int count = 5);
 
 }  // namespace gonio

@@ -75,25 +75,27 @@ void draw_lobes(Canvas& canvas, const Table& table, int map_incident, Point corn
     double highest = 0;
     for (const Lobe& lobe : lobes)
         for (const LobeSample& s : lobe.samples) highest = std::max(highest, s.f + s.error);
-    const Scale scale = enclosing_scale(0, highest > 0 ? highest : 1, false);
+    const Scale scale = enclosing_scale(0, highest > 0 ? highest : 1, false, 4);
+    const double reach =
+        0.88 * radius;  // of the highest value; beyond it there is room for the arrows of the lights
     const std::vector<double> rings = ticks(scale, 4);
     auto at = [&](double theta_deg, double f) {
-        const double r = radius * std::clamp(f / scale.high, 0.0, 1.0), theta = radians(theta_deg);
+        const double r = reach * std::clamp(f / scale.high, 0.0, 1.0), theta = radians(theta_deg);
         return Point{centre.x + r * std::sin(theta), centre.y - r * std::cos(theta)};
     };
 
     for (const double value : rings)
-        if (value > 0) canvas.arc(centre, radius * value / scale.high, 0, pi, pale, 0.8);
+        if (value > 0) canvas.arc(centre, reach * value / scale.high, 0, pi, pale, 0.8);
     for (int theta_deg = -90; theta_deg <= 90; theta_deg += 30) {
         canvas.line({centre, at(theta_deg, scale.high)}, pale, 0.8);
         const Point label{centre.x + (radius + 14) * std::sin(radians(theta_deg)),
                           centre.y - (radius + 12) * std::cos(radians(theta_deg))};
         canvas.text(label, std::to_string(std::abs(theta_deg)) + "\u00b0", 10.5, grey, Align::centre);
     }
-    canvas.line({at(-90, scale.high), at(90, scale.high)}, ink, 1);
+    canvas.line({{centre.x - radius, centre.y}, {centre.x + radius, centre.y}}, ink, 1);
     for (const double value : rings) {
         if (value == 0) continue;
-        const Point p{centre.x + radius * value / scale.high, centre.y + 11};
+        const Point p{centre.x + reach * value / scale.high, centre.y + 11};
         canvas.text(p, tick_label(value), 10, ink, Align::centre);
     }
     canvas.text({centre.x, centre.y + 12}, "0", 10, ink, Align::centre);
@@ -101,10 +103,10 @@ void draw_lobes(Canvas& canvas, const Table& table, int map_incident, Point corn
     canvas.text({centre.x - 0.5 * radius, centre.y + 12}, "\u2190 light side", 10, grey, Align::centre);
 
     if (lobes.empty()) {
-        canvas.text({centre.x, centre.y - 0.45 * radius}, "The table holds no outgoing directions", 12, ink,
-                    Align::centre);
-        canvas.text({centre.x, centre.y - 0.45 * radius + 17}, "in the plane of incidence.", 12, ink,
-                    Align::centre);
+        canvas.text({centre.x, centre.y - 0.45 * radius}, "The table holds too few outgoing directions", 12,
+                    ink, Align::centre);
+        canvas.text({centre.x, centre.y - 0.45 * radius + 17}, "in the plane of incidence to draw a lobe.",
+                    12, ink, Align::centre);
         return;
     }
     for (const Lobe& lobe : lobes) {
@@ -123,7 +125,7 @@ void draw_lobes(Canvas& canvas, const Table& table, int map_incident, Point corn
         auto on_ray = [&](double r) {
             return Point{centre.x - r * std::sin(theta), centre.y - r * std::cos(theta)};
         };
-        canvas.arrow(on_ray(radius + 2), on_ray(radius - 22), lobe.colour, 2);
+        canvas.arrow(on_ray(radius + 2), on_ray(reach + 2), table.channels.size() > 1 ? ink : lobe.colour, 2);
     }
     double y = centre.y + 48;
     for (size_t k = 0; k < lobes.size(); ++k) {

@@ -120,9 +120,10 @@ void draw_map(Canvas& canvas, const Table& table, int incident, size_t channel, 
               double width) {
     const AnglesDeg wi = table.incident[incident];
     const std::vector<OutgoingSample> samples = samples_of(table, incident, channel);
-    std::string title = "Outgoing hemisphere, light at \u03b8i " + number_text(wi.theta_deg, 3) +
-                        "\u00b0, \u03c6i " + number_text(wi.phi_deg, 3) + "\u00b0";
-    if (table.channels.size() > 1) title += ", channel " + table.channels[channel];
+    const std::string of_channel = table.channels.size() > 1 ? " (" + table.channels[channel] + ")" : "";
+    const std::string title = "Outgoing hemisphere" + of_channel + ", light at \u03b8i " +
+                              number_text(wi.theta_deg, 3) + "\u00b0, \u03c6i " + number_text(wi.phi_deg, 3) +
+                              "\u00b0";
     canvas.text(corner, title, 12.5, ink, Align::left, true);
 
     const double radius = 0.5 * (width - 110);
