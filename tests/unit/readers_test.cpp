@@ -483,6 +483,24 @@ TEST(Exr, HostileFilesAreRefused) {
     error_of("a.exr", huge);
 }
 
+TEST(Exr, AttributesThatDisagreeWithTheirSizesAreRefusedBeforeTheLibraryReadsThem) {
+    // Found by fuzzing: the library lost step with the file and took the next bytes for a size to allocate.
+    auto changed = [](const std::string& before_size, uint32_t from, uint32_t to) {
+        std::string bytes = exr({"Y"}, 4, 4);
+        const size_t at = bytes.find(before_size);
+        EXPECT_NE(at, std::string::npos);
+        EXPECT_EQ(load<uint32_t>(&bytes[at + before_size.size()], false), from);
+        return bytes.replace(at + before_size.size(), 4, raw_bytes(std::vector<uint32_t>{to}));
+    };
+    const std::string box("displayWindow\0box2i\0", 20), channels("channels\0chlist\0", 16);
+    for (const std::string& bytes :
+         {changed(box, 16, 17), changed(box, 16, 0), changed(channels, 19, 18), changed(channels, 19, 20)})
+        EXPECT_NE(std::string(error_of("a.exr", bytes).what()).find("OpenEXR: an attribute"),
+                  std::string::npos);
+    const Error e = error_of("a.exr", changed(box, 16, 0x7fffffff));
+    EXPECT_NE(std::string(e.what()).find("larger than the file"), std::string::npos) << e.what();
+}
+
 // ---- The list ----
 
 TEST(ReadHeights, ContentCountsBeforeTheExtension) {

@@ -74,25 +74,58 @@ constexpr std::string_view magic("\x76\x2f\x31\x01", 4);
 constexpr size_t header_start = 8;  // after magic and version
 constexpr uint32_t tiled_flag = 0x200, deep_flag = 0x800, multi_part_flag = 0x1000;
 
-// Walks the attributes (name, type, size, value) without reading them: OpenEXR allocates a value's stated
-// size before it looks whether the file has so many bytes.
-void check_attribute_sizes(const FileBytes& file) {
+// Types whose values have one size, which the library reads whatever size the file states.
+constexpr std::pair<uint32_t, std::string_view> types_of_size[] = {
+    {1, " compression deepImageState envmap lineOrder "},
+    {4, " float int "},
+    {8, " double rational timecode v2f v2i "},
+    {9, " tiledesc "},
+    {12, " v3f v3i "},
+    {16, " box2f box2i v2d "},
+    {24, " v3d "},
+    {28, " keycode "},
+    {32, " chromaticities "},
+    {36, " m33f "},
+    {64, " m44f "},
+    {72, " m33d "},
+    {128, " m44d "}};
+
+// Walks the attributes (name, type, size, value) before the library does: it allocates a value's stated size
+// before it looks whether the file has so many bytes, and loses step with the file where size and type
+// disagree.
+void check_attributes(const FileBytes& file) {
     size_t position = header_start;
-    auto skip_name = [&] {
+    auto next_name = [&] {
         const size_t end = file.bytes.find('\0', position);
         if (end == std::string_view::npos) refuse(file, "", "damaged OpenEXR: the header has no end");
-        const bool empty = end == position;
+        const std::string_view name = file.bytes.substr(position, end - position);
         position = end + 1;
-        return !empty;
+        return name;
     };
-    while (skip_name()) {
-        skip_name();
+    while (!next_name().empty()) {
+        const std::string_view type = next_name();
         if (file.bytes.size() - position < 4) refuse(file, "", "damaged OpenEXR: the header has no end");
         const auto size = load<uint32_t>(&file.bytes[position], false);
         position += 4;
         if (size > file.bytes.size() - position)
             refuse(file, "", "damaged OpenEXR: an attribute is larger than the file");
-        position += size;
+        const size_t end = position + size;
+        bool good = true;
+        const std::string spaced = " " + std::string(type) + " ";
+        for (const auto& [fixed, types] : types_of_size)
+            good = good && (size == fixed || types.find(spaced) == std::string_view::npos);
+        if (type == "chlist") {  // channels of a name and 16 bytes, then an empty name
+            bool more = true;
+            while (more && position < end) {
+                more = !next_name().empty();
+                if (more) position += 16;
+            }
+            good = !more && position == end;
+        }
+        if (!good)
+            refuse(file, std::string(type.substr(0, 40)),
+                   "damaged OpenEXR: an attribute of this type has a wrong size");
+        position = end;
     }
 }
 
@@ -125,7 +158,7 @@ RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
     int version = load<int32_t>(&file.bytes[4], false);
     if (version & deep_flag) refuse(file, "deep data", "a height map must be flat");
     if (version & multi_part_flag) refuse(file, "several parts", "a height map must be a single part");
-    check_attribute_sizes(file);
+    check_attributes(file);
     MemoryStream stream(file);
     stream.seekg(header_start);
     Imf::Header header;
