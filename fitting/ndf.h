@@ -58,7 +58,7 @@ struct NdfOptions {
     int n_theta = 60, n_phi = 72;  // bins of the table's fine part; >= 1
 };
 
-// All facets inside the measured border. Linear in their number; 4096 x 4096 takes seconds and some 500 MB.
+// All facets inside the measured border. Linear in their number; 4096 x 4096 takes seconds and 200 MB.
 // Standard errors assume slopes that are jointly normal between places, which sets their correlation only;
 // they grow optimistic on surfaces whose slope variance itself wanders over the patch.
 NdfResult measure_ndf(const HeightField& surface, const NdfOptions& options = {});
