@@ -217,10 +217,27 @@ TEST(PathTracer, GrooveAlongXEqualsGrooveAlongY) {
     const HeightField along_y = generate_v_groove(16, 2, 45);
     HeightField along_x = along_y;
     std::swap(along_x.nx, along_x.ny);
+    along_x.pitch_x *= 1000;  // along the groove, where nothing changes
     const BrdfResult a = trace(along_y, gray(0.8), pair_plan({{{60, 20}, {75, 100}}}), 40000);
     const BrdfResult b = trace(along_x, gray(0.8), pair_plan({{{60, 110}, {75, 190}}}), 40000);
     EXPECT_LT(std::abs(a.table.f[0] - b.table.f[0]), 3 * std::hypot(a.table.se[0], b.table.se[0]));
     EXPECT_LT(a.table.se[0], 0.01 * a.table.f[0]);
+}
+
+// The brightest channel steers the roulette: alone, a dark one is thinned, beside a white one it is not.
+TEST(PathTracer, RouletteIsUnbiased) {
+    const HeightField groove = generate_v_groove(8, 2, 70);
+    const BrdfPlan plan = pair_plan({{{20, 0}, {50, 180}}, {{10, 0}, {40, 180}}});
+    Lambertian both;
+    both.albedo = {0.3, 1};
+    const Table thinned = trace(groove, gray(0.3), plan, 30000).table;
+    const Table whole = trace(groove, {{"dark", "white"}, both}, plan, 30000).table;
+    std::vector<double> pulls;
+    for (size_t row = 0; row < 2; ++row) {
+        EXPECT_LT(thinned.se[row], 0.03 * thinned.f[row]);
+        pulls.push_back((thinned.f[row] - whole.f[row]) / std::hypot(thinned.se[row], whole.se[row]));
+    }
+    expect_within(pulls, "roulette");
 }
 
 TEST(PathTracer, AlbedoMapLightsOneWall) {
