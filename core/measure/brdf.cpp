@@ -8,17 +8,15 @@
 #include <numeric>
 
 #include "base/parallel.h"
-#include "measure/accuracy.h"
-#include "measure/mesh_bias.h"
-#include "measure/run.h"
+#include "measure/estimate.h"
+#include "measure/planning.h"
 #include "measure/simplify.h"
-#include "surface/facet_mesh.h"
 #include "visibility/march.h"
 
 namespace gonio {
 namespace {
 
-constexpr int runs_at_first = 4, most_runs = 16, most_stages = 12;
+constexpr int most_stages = 12;
 constexpr double default_target = 0.01;
 
 std::string number(double x) {
@@ -53,7 +51,7 @@ class Measurement {
 
     BrdfResult run() {
         Report& report = result_.report;
-        const auto [least, most] = albedo_range();
+        const double most = albedo_range().second;
         if (options_.allow_skips && is_plane(scene_.surface) && !scene_.material.is_map()) {
             report.skipped.push_back({"all tracing", "the surface is a plane: f = albedo / pi exactly"});
             fill_exact([&](size_t c) { return scene_.material.albedo[c] / pi; });
@@ -64,7 +62,6 @@ class Measurement {
             prepare(most);
             measure();
         }
-        (void)least;
         for (const auto& [key, value] : report.settings) result_.table.provenance.push_back({key, value});
         return std::move(result_);
     }
@@ -147,14 +144,14 @@ class Measurement {
         // Of the light of a facet, at most this share comes from other facets: they stand within the slab |z|
         // <= L / sqrt(1 + L^2).
         const double z_max = grid_.max_slope / std::sqrt(1 + grid_.max_slope * grid_.max_slope);
-        gentle_bound_ = std::min(1.0, 4 * z_max * z_max) * largest_albedo;
-        if (options_.allow_skips && gentle_bound_ < 0.1 * std::max(target(), 1e-6) && plan_.max_order != 1) {
+        skipped_bound_ = std::min(1.0, 4 * z_max * z_max) * largest_albedo;
+        if (options_.allow_skips && skipped_bound_ < 0.1 * std::max(target(), 1e-6) && plan_.max_order != 1) {
             context_.indirect = false;
             report.skipped.push_back(
                 {"indirect light", "slopes up to " + number(grid_.max_slope) + " send facets less than " +
-                                       number(gentle_bound_) + " of their light from others"});
+                                       number(skipped_bound_) + " of their light from others"});
         } else {
-            gentle_bound_ = 0;
+            skipped_bound_ = 0;
         }
         context_.series_tolerance = std::clamp(0.05 * target(), 1e-6, 1e-3);
         if (context_.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
@@ -175,75 +172,11 @@ class Measurement {
         if (light_of.size() == found.size()) context_.view_to_light = std::move(found);
     }
 
-    double rms_slope() const {
-        const HeightField& s = scene_.surface;
-        const int step = std::max(1, s.ny / 128);
-        double sum = 0;
-        long long n = 0;
-        for (int j = 0; j < s.ny; j += step)
-            for (int i = 0; i < s.nx; ++i, ++n) {
-                const Gradient g = facet_gradient(s, 0, i, j);
-                sum += g.x * g.x + g.y * g.y;
-            }
-        return std::sqrt(sum / static_cast<double>(n));
-    }
-
-    // Cells that one window costs, and windows that cover the surface once.
-    static double window_cells() { return std::pow(tile_core + 2.0 * tile_halo, 2); }
-    std::pair<int, int> covering_windows() const {
-        const HeightField& s = scene_.surface;
-        auto count = [](int n) { return std::max(1, (n + tile_core - 1) / tile_core); };
-        return {count(s.nx - 2 * s.border_x), count(s.ny - 2 * s.border_y)};
-    }
-    bool whole_fits(int refinement, const RunSettings& settings) const {
-        RunSettings whole = settings;
-        whole.tiles_x = whole.tiles_y = 0;
-        whole.refinement = refinement;
-        const bool same = !context_.view_to_light.empty();
-        return run_bytes(context_, whole, static_cast<int>(context_.lights.size()),
-                         same ? 0 : static_cast<int>(context_.views.size())) <
-               static_cast<double>(context_.max_bytes);
-    }
-
-    // A first guess from the measurements of shared/performance E (slope 0.7, 32768 facets): direct error
-    // 0.11 % with one sub-sample, indirect error 0.75 % with 16 directions, falling as n^-1.7. What it gets
-    // wrong, the stages mend.
-    RunSettings first_settings() const {
-        RunSettings settings;
-        const HeightField& s = scene_.surface;
-        const double slope = std::clamp(rms_slope(), 0.05, 3.0),
-                     wanted = std::max(target() > 0 ? target() : default_target, 1e-5);
-        double cells = static_cast<double>(s.nx) * s.ny;
-        if (cells > 1.5 * window_cells()) {
-            settings.tiles_x = settings.tiles_y = 1;
-            cells = tile_core * tile_core;
-        }
-        const double share = 0.6 * wanted * std::sqrt(static_cast<double>(runs_at_first)) /
-                             student_one_sigma(runs_at_first + 4);
-        const double direct = 0.0011 * (slope / 0.7) * std::sqrt(16384 / cells),
-                     indirect = 0.0075 * std::pow(slope / 0.7, 1.5);
-        settings.sub_samples = std::clamp(static_cast<int>(std::ceil(std::pow(direct / share, 1.25))), 1, 64);
-        settings.directions =
-            std::clamp(static_cast<int>(16 * std::ceil(std::pow(indirect / share, 1 / 1.7))), 16, 1024);
-        return settings;
-    }
-
     void measure();
-    struct Stage {
-        RunSettings settings;
-        int number = 0;
-        Moments f, direct;
-        double remainder = 0;
-    };
-    struct Estimate {
-        std::vector<double> f, se, bias;  // of every slice and channel
-        double total = 0, random = 0, direct = 0,
-               systematic = 0;  // relative, rms over the rows of all channels
-    };
     void run_stage(Stage& stage, int n_runs);
-    Estimate estimate(const std::vector<Stage>& stages) const;
-    bool next_settings(const Stage& stage, const Estimate& e, double target, RunSettings& next,
-                       int& more_runs) const;
+    void find_mesh_bias(const std::vector<Stage>& stages);
+    bool ends_in_time(const Stage& stage, NextStep& step) const;
+    void fill_report(const std::vector<Stage>& stages, const Estimate& estimate);
 
     const BrdfPlan& plan_;
     RunOptions options_;
@@ -254,7 +187,7 @@ class Measurement {
     RowGroups groups_;
     MarchGrid grid_;
     RunContext context_;
-    double gentle_bound_ = 0;
+    double skipped_bound_ = 0;
     MeshBias mesh_bias_;
     double seconds_per_run_ = 0;
     RunValues totals_;  // counters of all runs
@@ -265,6 +198,10 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
     const int outer = std::min(options_.n_threads, n_runs), inner = std::max(1, options_.n_threads / outer);
     context_.max_bytes = static_cast<long long>(0.8 * static_cast<double>(options_.max_bytes)) / outer;
     const int first = stage.f.count();
+    const bool transport = context_.indirect && context_.max_order != 1;
+    context_.keep_first = transport && first == 0 && stage.settings.tiles_x == 0;
+    if (transport && first == 0 && stage.settings.tiles_x > 0)
+        stage.noise = measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_);
     std::vector<RunValues> runs(n_runs);
     int done = 0;
     const double began = seconds();
@@ -276,6 +213,12 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
                          "runs of stage " + std::to_string(stage.number + 1), result_.report.relative_error});
     });
     seconds_per_run_ = (seconds() - began) / n_runs * outer;
+    if (context_.keep_first) {
+        std::vector<const Fields*> first_orders;
+        for (const RunValues& r : runs) first_orders.push_back(&r.first);
+        stage.noise = noise_bias(whole_tile(context_, stage.settings), first_orders, runs[0].first_irradiance,
+                                 scene_.material.is_map() ? 1.0 : albedo_range().second);
+    }
     for (const RunValues& r : runs) {
         stage.f.add(r.f);
         stage.direct.add(r.direct);
@@ -290,216 +233,78 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
         totals_.seconds_links += r.seconds_links;
         totals_.seconds_series += r.seconds_series;
         totals_.applications = std::max(totals_.applications, r.applications);
-        totals_.higher_orders = std::max(totals_.higher_orders, r.higher_orders);
     }
+    // Runs that keep orders apart must agree on how many.
+    if (plan_.separate_orders && plan_.max_order == 0) context_.fixed_applications = totals_.applications;
 }
 
-Measurement::Estimate Measurement::estimate(const std::vector<Stage>& stages) const {
-    const size_t rows = context_.rows(), n_channels = result_.table.channels.size();
-    const size_t slices = stages.back().f.mean().size() / (rows * n_channels);
-    Estimate e;
-    e.f.assign(stages.back().f.mean().size(), 0.0);
-    e.se = e.bias = e.f;
-    // Stages of the same mesh are independent estimates of the same values: they are averaged with weights
-    // from their pooled variances.
-    std::vector<const Stage*> used;
-    for (const Stage& s : stages)
-        if (s.settings.refinement == stages.back().settings.refinement && s.f.mean().size() == e.f.size())
-            used.push_back(&s);
-    std::vector<std::vector<std::vector<double>>> se(used.size());
-    std::vector<double> weight(used.size());
-    for (size_t s = 0; s < used.size(); ++s) {
-        double pooled = 0;
-        for (size_t slice = 0; slice < n_channels * slices; ++slice) {
-            se[s].push_back(standard_errors(used[s]->f, slice * rows, groups_));
-            if (slice % slices != 0) continue;
-            const std::vector<double> scale =
-                error_scale({used[s]->f.mean().begin() + static_cast<long>(slice * rows),
-                             used[s]->f.mean().begin() + static_cast<long>((slice + 1) * rows)});
-            for (size_t r = 0; r < rows; ++r)
-                if (scale[r] > 0) pooled += std::pow(se[s].back()[r] / scale[r], 2);
-        }
-        weight[s] = 1 / std::max(pooled, 1e-30);
+// The two-grid run is skipped where a guess from the relief is far below what was asked for.
+void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
+    if (!context_.indirect || context_.max_order == 1) return;
+    const bool explicit_samples = plan_.accuracy.samples.has_value();
+    mesh_bias_ = predict_mesh_bias(scene_.surface);
+    const Estimate with = make_estimate(context_, groups_, stages, mesh_bias_, skipped_bound_);
+    const Estimate without = make_estimate(context_, groups_, stages, {}, skipped_bound_);
+    const double guess =
+        safe_sqrt(with.systematic * with.systematic - without.systematic * without.systematic);
+    if (options_.allow_skips && 3 * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
+        if (stages.size() == 1)
+            result_.report.skipped.push_back(
+                {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});
+        return;
     }
-    const double weights = std::accumulate(weight.begin(), weight.end(), 0.0);
-    for (size_t s = 0; s < used.size(); ++s)
-        for (size_t i = 0; i < e.f.size(); ++i) {
-            e.f[i] += weight[s] / weights * used[s]->f.mean()[i];
-            e.se[i] += std::pow(weight[s] / weights * se[s][i / rows][i % rows], 2);
-        }
-    for (double& v : e.se) v = std::sqrt(v);
-
-    // Bias: mesh (relative to the indirect part), the continuation of the orders, and what a skipped indirect
-    // part could have added.
-    double sum_total = 0, sum_random = 0, sum_bias = 0, sum_direct = 0;
-    const std::vector<double> direct_se = standard_errors(stages.back().direct, 0, groups_);
-    const double remainder = stages.back().remainder;
-    for (size_t c = 0; c < n_channels; ++c) {
-        for (size_t slice = 0; slice < slices; ++slice)
-            for (size_t r = 0; r < rows; ++r) {
-                const size_t i = (c * slices + slice) * rows + r;
-                double indirect = e.f[i];
-                if (slice == 1) indirect = 0;
-                if (slice == 0) {
-                    // The direct part of channel 0, scaled to this channel's share of the sum; a map's
-                    // channels differ little in it.
-                    const double share =
-                        e.f[r] > 0 ? std::min(1.0, stages.back().direct.mean()[r] / stages.back().f.mean()[r])
-                                   : 1.0;
-                    indirect = slices > 1 ? e.f[i] - e.f[i + rows] : e.f[i] * (1 - share);
-                }
-                indirect = std::max(0.0, indirect);
-                e.bias[i] =
-                    std::hypot(
-                        mesh_bias_.uncertainty * indirect,
-                        slice == 0 ? series_continuation_error * remainder * (e.f[i] - indirect) : 0.0) +
-                    (slice == 0 ? gentle_bound_ * e.f[i] : 0.0);
-                e.f[i] += mesh_bias_.correction * indirect;
-            }
-        const std::vector<double> total(e.f.begin() + static_cast<long>(c * slices * rows),
-                                        e.f.begin() + static_cast<long>((c * slices + 1) * rows));
-        const std::vector<double> scale = error_scale(total);
-        for (size_t r = 0; r < rows; ++r) {
-            if (!(scale[r] > 0)) continue;
-            const size_t i = c * slices * rows + r;
-            const double random = std::pow(e.se[i] / scale[r], 2), bias = std::pow(e.bias[i] / scale[r], 2);
-            sum_random += random;
-            sum_bias += bias;
-            sum_total += random + bias;
-            if (c == 0) sum_direct += std::pow(direct_se[r] / scale[r], 2);
-        }
-    }
-    const double n = static_cast<double>(rows * n_channels);
-    e.total = std::sqrt(sum_total / n);
-    e.random = std::sqrt(sum_random / n);
-    e.systematic = std::sqrt(sum_bias / n);
-    e.direct = std::sqrt(sum_direct / static_cast<double>(rows));
-    return e;
+    mesh_bias_ = measure_mesh_bias(context_, stages.back().settings, options_.n_threads, monitor_);
 }
 
-// What to change so that the error falls below the target: false if nothing can.
-bool Measurement::next_settings(const Stage& stage, const Estimate& e, double target, RunSettings& next,
-                                int& more_runs) const {
-    next = stage.settings;
-    more_runs = 0;
-    if (e.systematic > 0.8 * target) {
-        const double unknowns =
-            2.0 * scene_.surface.nx * scene_.surface.ny * std::pow(2 * next.refinement, 2);
-        if (next.refinement >= 16 || unknowns > 3e7 || !context_.indirect) {
-            if (e.random < 0.5 * target) return false;  // what is left cannot be refined away
-        } else {
-            next.refinement *= 2;
-            next.directions *= 2;
-            return true;
-        }
-    }
-    const double left = std::sqrt(
-                     std::max(target * target - e.systematic * e.systematic, 0.04 * target * target)),
-                 excess = e.random / left;
-    if (next.tiles_x > 0) {  // windows: most of the error is which part of the surface was seen
-        const auto [full_x, full_y] = covering_windows();
-        const double factor = std::clamp(1.15 * excess, 1.2, 4.0);
-        if (next.tiles_x < full_x || next.tiles_y < full_y) {
-            next.tiles_x = std::min(full_x, static_cast<int>(std::ceil(next.tiles_x * factor)));
-            next.tiles_y = std::min(full_y, static_cast<int>(std::ceil(next.tiles_y * factor)));
-            const double whole_cells = static_cast<double>(scene_.surface.nx) * scene_.surface.ny;
-            if (next.tiles_x * next.tiles_y * window_cells() > whole_cells &&
-                whole_fits(next.refinement, next) && scene_.surface.border_x == 0 &&
-                scene_.surface.border_y == 0)
-                next.tiles_x = next.tiles_y = 0;
-            return true;
-        }
-    }
-    if (excess < 1.6 && stage.f.count() < most_runs) {
-        more_runs = std::clamp(static_cast<int>(std::ceil(stage.f.count() * (1.15 * excess * excess - 1))), 2,
-                               most_runs - stage.f.count());
+// Whether the step ends before max_seconds; a step that would not is made smaller if that helps.
+bool Measurement::ends_in_time(const Stage& stage, NextStep& step) const {
+    if (!plan_.accuracy.max_seconds) return true;
+    const double left = *plan_.accuracy.max_seconds - seconds();
+    auto wall = [&](int runs, double cost) {
+        return cost * seconds_per_run_ * std::ceil(static_cast<double>(runs) / options_.n_threads);
+    };
+    if (step.more_runs > 0) {
+        if (wall(step.more_runs, 1) <= left) return true;
+    } else if (wall(runs_at_first, relative_cost(context_, step.settings, stage.settings)) <= left) {
         return true;
     }
-    const double indirect = std::sqrt(std::max(0.0, e.random * e.random - e.direct * e.direct)),
-                 share = 0.65 * left;
-    if (e.direct > share)
-        next.sub_samples = std::min(
-            4096, static_cast<int>(
-                      std::ceil(next.sub_samples * std::clamp(std::pow(e.direct / share, 1.25), 1.5, 8.0))));
-    if (indirect > share && context_.indirect)
-        next.directions = std::min(
-            1 << 14, static_cast<int>(std::ceil(next.directions *
-                                                std::clamp(std::pow(indirect / share, 1 / 1.5), 1.5, 8.0))));
-    return !(next == stage.settings);
+    step.more_runs = 2;
+    return stage.f.count() < most_runs && wall(2, 1) <= left;
 }
 
 void Measurement::measure() {
-    Report& report = result_.report;
     const std::optional<Accuracy::Samples>& samples = plan_.accuracy.samples;
-    std::vector<Stage> stages(1);
-    stages[0].settings =
-        samples ? RunSettings{samples->sub_samples, samples->directions, samples->refinement, 0, 0}
-                : first_settings();
+    const double wanted = target();
     context_.max_bytes =
         static_cast<long long>(0.8 * static_cast<double>(options_.max_bytes)) / options_.n_threads;
-    if (samples && !whole_fits(samples->refinement, stages[0].settings))
-        std::tie(stages[0].settings.tiles_x, stages[0].settings.tiles_y) = covering_windows();
+    std::vector<Stage> stages(1);
+    if (samples) {
+        stages[0].settings = {samples->sub_samples, samples->directions, samples->refinement, 0, 0};
+        if (!run_fits(context_, stages[0].settings))
+            std::tie(stages[0].settings.tiles_x, stages[0].settings.tiles_y) = covering_windows(context_);
+    } else {
+        stages[0].settings = first_settings(context_, wanted > 0 ? wanted : default_target);
+    }
     run_stage(stages[0], samples ? std::max(2, samples->replicates) : runs_at_first);
-    if (plan_.separate_orders && plan_.max_order == 0) context_.fixed_applications = totals_.applications;
+    find_mesh_bias(stages);
 
-    mesh_bias_ = predict_mesh_bias(scene_.surface);
-    const double wanted = target();
-    auto refine_bias = [&](const Stage& stage) {
-        // The two-grid run is skipped where the guess is far below what was asked for.
-        const Estimate guess = estimate(stages);
-        if (!context_.indirect || context_.max_order == 1) return;
-        if (options_.allow_skips && 3 * guess.systematic < std::max(wanted, samples ? guess.random : 0.0)) {
-            if (stage.number == 0)
-                report.skipped.push_back({"two-grid run", "facets resolve the relief: mesh bias guessed at " +
-                                                              number(guess.systematic)});
-            return;
-        }
-        mesh_bias_ = measure_mesh_bias(context_, stage.settings, options_.n_threads, monitor_);
-    };
-    refine_bias(stages[0]);
-    Estimate e = estimate(stages);
-    while (true) {
-        report.relative_error = e.total;
-        monitor_.report({0.5, "error reached", e.total});
-        if (samples || (wanted > 0 && e.total <= wanted) || static_cast<int>(stages.size()) >= most_stages)
-            break;
-        const double aim = wanted > 0 ? wanted : 0.5 * e.total;
-        RunSettings next;
-        int more_runs = 0;
-        if (!next_settings(stages.back(), e, aim, next, more_runs)) break;
-        if (plan_.accuracy.max_seconds) {
-            // Will the next runs end in time? Their cost grows with everything that grew.
-            const RunSettings& now = stages.back().settings;
-            double growth = std::max({1.0, static_cast<double>(next.directions) / now.directions,
-                                      static_cast<double>(next.sub_samples) / now.sub_samples}) *
-                            (next.refinement > now.refinement ? 2.0 : 1.0);
-            if (now.tiles_x > 0)
-                growth *= next.tiles_x > 0
-                              ? static_cast<double>(next.tiles_x * next.tiles_y) / (now.tiles_x * now.tiles_y)
-                              : static_cast<double>(scene_.surface.nx) * scene_.surface.ny /
-                                    (now.tiles_x * now.tiles_y * window_cells());
-            const double n = more_runs > 0 ? more_runs : runs_at_first;
-            if (seconds() + growth * seconds_per_run_ * n / std::min<double>(n, options_.n_threads) >
-                *plan_.accuracy.max_seconds) {
-                if (!(now == next) && stages.back().f.count() < most_runs &&
-                    seconds() + 2 * seconds_per_run_ / std::min(2, options_.n_threads) <=
-                        *plan_.accuracy.max_seconds)
-                    more_runs = 2;  // a smaller step still fits
-                else
-                    break;
-            }
-        }
-        if (more_runs > 0) {
-            run_stage(stages.back(), more_runs);
+    Estimate e = make_estimate(context_, groups_, stages, mesh_bias_, skipped_bound_);
+    while (!samples && (wanted == 0 || e.total > wanted) && static_cast<int>(stages.size()) < most_stages) {
+        result_.report.relative_error = e.total;
+        NextStep step = next_step(context_, stages.back(), e, wanted > 0 ? wanted : 0.5 * e.total);
+        if (!step.possible || !ends_in_time(stages.back(), step)) break;
+        if (step.more_runs > 0) {
+            run_stage(stages.back(), step.more_runs);
         } else {
-            const bool finer = next.refinement != stages.back().settings.refinement;
+            const bool finer = step.settings.refinement != stages.back().settings.refinement;
+            const int stage_number = static_cast<int>(stages.size());
             stages.emplace_back();
-            stages.back().settings = next;
-            stages.back().number = static_cast<int>(stages.size()) - 1;
+            stages.back().settings = step.settings;
+            stages.back().number = stage_number;
             run_stage(stages.back(), runs_at_first);
-            if (finer) refine_bias(stages.back());
+            if (finer) find_mesh_bias(stages);
         }
-        e = estimate(stages);
+        e = make_estimate(context_, groups_, stages, mesh_bias_, skipped_bound_);
     }
 
     Table& table = result_.table;
@@ -513,26 +318,34 @@ void Measurement::measure() {
         table.se[i] = static_cast<float>(e.se[i]);
         table.bias[i] = static_cast<float>(e.bias[i]);
     }
-    report.relative_error = e.total;
-    report.target_met = samples.has_value() || wanted == 0 || e.total <= wanted;
+    fill_report(stages, e);
+}
+
+void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& e) {
+    Report& report = result_.report;
+    const double wanted = target();
     const RunSettings& last = stages.back().settings;
     int runs = 0;
     for (const Stage& s : stages) runs += s.f.count();
-    report.settings = {{"transport", "diffuse operator"},
-                       {"simd", simd_target()},
-                       {"sub_samples", std::to_string(last.sub_samples)},
-                       {"directions", std::to_string(last.directions)},
-                       {"refinement", std::to_string(last.refinement)},
-                       {"windows", last.tiles_x == 0 ? "whole period"
-                                                     : std::to_string(last.tiles_x * last.tiles_y) + " of " +
-                                                           std::to_string(tile_core) + " x " +
-                                                           std::to_string(tile_core) + " cells a run"},
-                       {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) +
-                                    " in " + std::to_string(stages.size()) + " stages)"},
-                       {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
-                                                               number(100 * mesh_bias_.correction) + " %"
-                                                         : "guessed from the relief"},
-                       {"relative_error", number(e.total)}};
+    report.relative_error = e.total;
+    report.target_met = wanted == 0 || e.total <= wanted;
+    const std::string side = std::to_string(tile_core);
+    report.settings = {
+        {"transport", "diffuse operator"},
+        {"simd", simd_target()},
+        {"sub_samples", std::to_string(last.sub_samples)},
+        {"directions", std::to_string(last.directions)},
+        {"refinement", std::to_string(last.refinement)},
+        {"windows", last.tiles_x == 0 ? "whole period"
+                                      : std::to_string(last.tiles_x * last.tiles_y) + " a run of " + side +
+                                            " x " + side + " cells"},
+        {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) + " in " +
+                     std::to_string(stages.size()) + " stages)"},
+        {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
+                                                number(100 * mesh_bias_.correction) + " %"
+                                          : "guessed from the relief"},
+        {"noise_bias", "corrected by " + number(-100 * stages.back().noise.kappa) + " % of the direct part"},
+        {"relative_error", number(e.total)}};
     report.counters = {
         {"rays", totals_.rays},
         {"rays skipped (steeper than the relief)", totals_.rays_skipped},

@@ -12,30 +12,31 @@ namespace gonio {
 
 struct Accuracy {
     // Exactly one of the three says when to stop; all empty means target 0.01.
-    std::optional<double> target_relative_error;  // rms over the table of sqrt(se^2 + bias^2) / max(f, 0.01 mean f)
-    std::optional<double> max_seconds;            // may also stand beside a target: whichever comes first
+    std::optional<double>
+        target_relative_error;          // rms over the table of sqrt(se^2 + bias^2) / max(f, 0.01 mean f)
+    std::optional<double> max_seconds;  // may also stand beside a target: whichever comes first
     struct Samples {
-        int sub_samples = 1;   // points per facet and replicate for the direct term, >= 1
-        int directions = 64;   // shared directions of the indirect term per replicate, >= 1
-        int refinement = 1;    // each facet split into refinement^2 parts of constant radiosity: 1, 2 or 4
-        int replicates = 8;    // independent randomisations, >= 2
+        int sub_samples = 1;  // points per facet and replicate for the direct term, >= 1
+        int directions = 64;  // shared directions of the indirect term per replicate, >= 1
+        int refinement = 1;   // each facet split into refinement^2 parts of constant radiosity: 1, 2 or 4
+        int replicates = 8;   // independent randomisations, >= 2
     };
-    std::optional<Samples> samples;               // explicit settings
+    std::optional<Samples> samples;  // explicit settings
     uint64_t seed = 1;
 };
 
 struct BrdfPlan {
-    std::vector<AnglesDeg> incident, outgoing;    // as in Table
-    std::vector<std::pair<int, int>> pairs;       // as in Table: empty for the full product
-    int max_order = 0;                            // 0: all orders; K: orders 1..K only
-    bool separate_orders = false;                 // K slices of single orders beside the sum
+    std::vector<AnglesDeg> incident, outgoing;  // as in Table
+    std::vector<std::pair<int, int>> pairs;     // as in Table: empty for the full product
+    int max_order = 0;                          // 0: all orders; K: orders 1..K only
+    bool separate_orders = false;               // K slices of single orders beside the sum
     Accuracy accuracy;
 };
 
 struct RunOptions {
     int n_threads = 1;
-    bool allow_skips = true;                      // --no-skip: do the work that the report would say was skipped
-    long long max_bytes = 6LL << 30;              // working memory
+    bool allow_skips = true;          // --no-skip: do the work that the report would say was skipped
+    long long max_bytes = 6LL << 30;  // working memory
 };
 
 }  // namespace gonio

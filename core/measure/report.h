@@ -8,14 +8,15 @@
 namespace gonio {
 
 struct Report {
-    std::vector<std::pair<std::string, std::string>> settings;  // "transport" = "diffuse operator", "directions" = "64", ...
-    std::vector<std::pair<std::string, std::string>> skipped;   // what -> why
-    std::vector<std::pair<std::string, double>> seconds;        // CPU seconds by stage
-    std::vector<std::pair<std::string, double>> counters;       // rays, links, degenerate events, ...
+    std::vector<std::pair<std::string, std::string>>
+        settings;  // "transport" = "diffuse operator", "directions" = "64", ...
+    std::vector<std::pair<std::string, std::string>> skipped;  // what -> why
+    std::vector<std::pair<std::string, double>> seconds;       // CPU seconds by stage
+    std::vector<std::pair<std::string, double>> counters;      // rays, links, degenerate events, ...
     std::vector<std::string> warnings;
-    double relative_error = 0;                                  // reached, as defined in Accuracy
+    double relative_error = 0;  // reached, as defined in Accuracy
     bool target_met = true;
-    std::vector<double> directional_albedo;                     // [channel][incident], empty when not computed
+    std::vector<double> directional_albedo;  // [channel][incident], empty when not computed
 };
 
 }  // namespace gonio

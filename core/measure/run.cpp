@@ -25,10 +25,8 @@ struct Shifts {
 std::vector<Tile> make_tiles(const RunContext& context, const RunSettings& settings, const Shifts& shifts) {
     const HeightField& s = *context.surface;
     if (settings.tiles_x == 0) {
-        const CellRect whole{0, 0, s.nx, s.ny};
-        const CellRect core{s.border_x, s.border_y, s.nx - 2 * s.border_x, s.ny - 2 * s.border_y};
         std::vector<Tile> tiles;
-        tiles.push_back(make_tile(s, whole, core, settings.refinement));
+        tiles.push_back(whole_tile(context, settings));
         return tiles;
     }
     // A randomly shifted lattice of windows: with as many as fit it covers the surface once. Of an open
@@ -224,6 +222,42 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
 
 }  // namespace
 
+std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b) {
+    std::vector<SubSample> samples;
+    for (int k = 0; k < n; ++k)
+        samples.push_back({fractional_part(shift_a + k * 0.7548776662466927),
+                           fractional_part(shift_b + k * 0.5698402909980532)});
+    return samples;
+}
+
+Tile whole_tile(const RunContext& context, const RunSettings& settings) {
+    const HeightField& s = *context.surface;
+    return make_tile(s, {0, 0, s.nx, s.ny},
+                     {s.border_x, s.border_y, s.nx - 2 * s.border_x, s.ny - 2 * s.border_y},
+                     settings.refinement);
+}
+
+std::vector<Vec3> probe_directions(const RunContext& context) {
+    constexpr size_t most = 16;
+    std::vector<Vec3> chosen, all = context.lights;
+    if (context.view_to_light.empty()) all.insert(all.end(), context.views.begin(), context.views.end());
+    const size_t n = std::min(most, all.size());
+    for (size_t k = 0; k < n; ++k) chosen.push_back(all[(2 * k + 1) * all.size() / (2 * n)]);
+    return chosen;
+}
+
+Tile probe_tile(const RunContext& context, const RunSettings& settings, int refinement) {
+    const HeightField& s = *context.surface;
+    const int width = std::min(s.nx, tile_core), height = std::min(s.ny, tile_core);
+    const bool whole = settings.tiles_x == 0 && width == s.nx && height == s.ny;
+    const int halo_x = whole ? 0 : std::min(tile_halo, (s.nx - width) / 2),
+              halo_y = whole ? 0 : std::min(tile_halo, (s.ny - height) / 2);
+    const CellRect area{wrap_index((s.nx - width) / 2 - halo_x, s.nx),
+                        wrap_index((s.ny - height) / 2 - halo_y, s.ny), width + 2 * halo_x,
+                        height + 2 * halo_y};
+    return make_tile(s, area, {halo_x, halo_y, width, height}, refinement);
+}
+
 double run_bytes(const RunContext& context, const RunSettings& settings, int n_lights, int n_views) {
     const HeightField& s = *context.surface;
     double cells = static_cast<double>(s.nx) * s.ny;
@@ -249,15 +283,11 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
     RunValues values;
     const std::vector<Tile> tiles = make_tiles(context, settings, shifts);
 
-    std::vector<SubSample> sub_samples, jitter;
-    for (int k = 0; k < settings.sub_samples; ++k)  // R2 sequence (Roberts), shifted
-        sub_samples.push_back({fractional_part(shifts(2) + k * 0.7548776662466927),
-                               fractional_part(shifts(3) + k * 0.5698402909980532)});
+    const std::vector<SubSample> sub_samples =
+        shifted_sub_samples(settings.sub_samples, shifts(2), shifts(3));
     const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
     const DirectionSet set = slab_directions(settings.directions, z_max, shifts(4), shifts(5));
-    for (int k = 0; k < settings.directions; ++k)
-        jitter.push_back({fractional_part(shifts(6) + k * 0.7548776662466927),
-                          fractional_part(shifts(7) + k * 0.5698402909980532)});
+    const std::vector<SubSample> jitter = shifted_sub_samples(settings.directions, shifts(6), shifts(7));
 
     size_t slices = 0;
     for (const Block& block : make_blocks(context, settings)) {
@@ -294,6 +324,7 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                 options.max_order = context.max_order;
                 options.tolerance = context.series_tolerance;
                 options.fixed_applications = context.fixed_applications;
+                options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
                 if (!context.material->is_map())
                     options.largest_albedo =
                         *std::max_element(context.material->albedo.begin(), context.material->albedo.end());
@@ -312,6 +343,12 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     series.push_back(diffuse_series(op, tile, irradiance.lights, irradiance.view_fields(),
                                                     block.same, factors.empty() ? nullptr : &factors[c],
                                                     options, n_threads, monitor));
+                    if (options.keep_first && c == 0) {
+                        values.first = std::move(series.back().first);
+                        values.first_irradiance =
+                            first_block(block.same || lights.size() <= views.size() ? irradiance.lights
+                                                                                    : irradiance.views);
+                    }
                     values.ratio = std::max(values.ratio, series.back().ratio);
                     values.remainder = std::max(values.remainder, series.back().remainder);
                     values.applications = std::max(values.applications, series.back().applications);

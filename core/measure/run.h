@@ -27,6 +27,7 @@ struct RunContext {
     int max_order = 0;
     double series_tolerance = 1e-4;
     int fixed_applications = 0;
+    bool keep_first = false;  // RunValues::first, for the noise bias
     long long max_bytes = 0;  // for one run
 
     size_t rows() const { return plan->pairs.empty() ? lights.size() * views.size() : plan->pairs.size(); }
@@ -56,6 +57,9 @@ struct RunValues {
     std::vector<float> f;
     std::vector<float>
         direct;  // channel 0: the first order alone, [row]: tells which part of the error dominates
+    // If asked for: the irradiance g of the first block of transported directions, and K g, over the whole
+    // period.
+    Fields first_irradiance, first;
     double rays = 0, rays_skipped = 0, links = 0, substituted = 0, dropped = 0;
     int truncated_bundles = 0;
     double seconds_direct = 0, seconds_links = 0, seconds_series = 0;  // CPU of the calling threads
@@ -64,6 +68,17 @@ struct RunValues {
 // run: number of the run inside its stage; (seed, stage, run) key its random numbers.
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
                    const Monitor& monitor);
+
+// n places inside the facets: the R2 sequence (Roberts 2018) from a random start.
+std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b);
+
+// The whole period as one tile, its measured core without the border of an open surface.
+Tile whole_tile(const RunContext& context, const RunSettings& settings);
+
+// For side measurements that need not be done for every direction and everywhere: up to 16 of the lights and
+// views, and the whole period or, if the runs use windows or the surface is large, one window in its middle.
+std::vector<Vec3> probe_directions(const RunContext& context);
+Tile probe_tile(const RunContext& context, const RunSettings& settings, int refinement);
 
 // Working memory of one run that cannot be split further, bytes.
 double run_bytes(const RunContext& context, const RunSettings& settings, int n_lights, int n_views);

@@ -80,6 +80,7 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
     }
     const int m = result.applications;
     if (m == 0) return result;
+    if (options.keep_first) result.first = first_block(carried[0]);
 
     if (options.combine) {
         // sum_{k=1}^{2M} = <g, S> + <a^M K^M g, S> with S = sum_{k=1}^{M} a^k K^k g.
@@ -118,6 +119,7 @@ OrderSeries one_sided_series(const Series& series, const Fields& lights, const F
     while (result.applications < wanted && result.applications < 2 * options.max_applications) {
         monitor.check_cancelled();
         Fields next = series.next(carried.empty() ? source : carried.back());
+        if (options.keep_first && result.applications == 0) result.first = first_block(next);
         if (!options.combine) carried.clear();
         carried.push_back(std::move(next));
         ++result.applications;

@@ -16,8 +16,9 @@ struct SeriesOptions {
                                  // order by order must agree
     int average_to = 0;  // r >= 1: after each application, average over the facet parts that refinement r
                          // does not tell apart
-    std::optional<double>
-        combine;  // sum the orders of this one albedo at once: two products in all instead of one an order
+    bool keep_first = false;  // fill OrderSeries::first
+    // Sum the orders of this one albedo at once: two products in all instead of one an order.
+    std::optional<double> combine;
 };
 
 // higher[k - 1] (lights x views): sum over the core of area-scaled products <g_view, K^k g_light>, order k +
@@ -27,6 +28,7 @@ struct OrderSeries {
     // What is beyond the last order continues as a geometric series with this ratio per order (albedo not
     // included): the light has forgotten where it came from. 0 if the orders were limited by the job.
     double ratio = 0;
+    Fields first;          // if asked for: K applied once to the first block of columns of the transported side
     double remainder = 0;  // relative size of that continuation, for the bias estimate
     int applications = 0;
 };

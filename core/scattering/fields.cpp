@@ -26,6 +26,12 @@ void pack(const Combination& terms, size_t first, size_t count, int padded_colum
 
 }  // namespace
 
+Fields first_block(const Fields& fields) {
+    Fields block(fields.n_unknowns(), std::min(column_block, fields.n_columns()));
+    std::copy_n(fields.block(0), block.values().size(), block.block(0));
+    return block;
+}
+
 void add_products(const Tile& tile, const Combination& a, const Combination& b, double scale, int n_threads,
                   Matrix& sum) {
     // Two levels of threads would fight; and a BLAS that splits sums by its own thread count would change

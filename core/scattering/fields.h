@@ -37,6 +37,9 @@ class Fields {
     HugeFloats values_;
 };
 
+// A copy of the first block of columns.
+Fields first_block(const Fields& fields);
+
 // Row-major matrix of sums, in double.
 struct Matrix {
     int rows = 0, columns = 0;

@@ -1,0 +1,31 @@
+// From stages of independent runs to the values, standard errors and biases of a table.
+#pragma once
+#include "measure/accuracy.h"
+#include "measure/mesh_bias.h"
+#include "measure/noise_bias.h"
+#include "measure/run.h"
+
+namespace gonio {
+
+// Independent runs at the same settings.
+struct Stage {
+    RunSettings settings;
+    int number = 0;
+    Moments f, direct;     // of RunValues::f and RunValues::direct
+    double remainder = 0;  // largest of its runs
+    NoiseBias noise;
+};
+
+struct Estimate {
+    std::vector<double> f, se, bias;  // [channel][slice][row], as in Table
+    // Relative to max(f, 0.01 mean f), rms over rows and channels: standard error and bias together, each
+    // alone, and the standard error of the direct part of channel 0.
+    double total = 0, random = 0, systematic = 0, direct = 0;
+};
+
+// Stages on the mesh of the last one are independent estimates of the same values: they are averaged,
+// weighted by their pooled variances. skipped_bound: relative bound on indirect light that was not computed.
+Estimate make_estimate(const RunContext& context, const RowGroups& groups, const std::vector<Stage>& stages,
+                       const MeshBias& mesh_bias, double skipped_bound);
+
+}  // namespace gonio
