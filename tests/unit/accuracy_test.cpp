@@ -1,0 +1,164 @@
+// Errors must be honest where the truth is known: synthetic runs with Gaussian noise.
+#include "measure/accuracy.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "base/numeric.h"
+
+namespace gonio {
+namespace {
+
+// Student's distribution function by Simpson's rule on its density.
+double student_cdf(double t, double freedom) {
+    const double scale =
+        std::exp(std::lgamma((freedom + 1) / 2) - std::lgamma(freedom / 2)) / std::sqrt(freedom * pi);
+    constexpr int n = 2000;
+    double sum = 0;
+    for (int k = 0; k <= n; ++k) {
+        const double x = t * k / n, density = std::pow(1 + x * x / freedom, -(freedom + 1) / 2);
+        sum += density * (k == 0 || k == n ? 1 : k % 2 ? 4 : 2);
+    }
+    return 0.5 + scale * sum * t / n / 3;
+}
+
+TEST(Accuracy, StudentOneSigmaIsTheQuantile) {
+    const double one_sigma = 0.5 * std::erfc(-1 / std::sqrt(2.0));
+    for (const double freedom : {1.0, 1.5, 2.0, 3.0, 4.0, 5.5, 7.0, 8.0, 12.0, 20.0, 100.0, 1000.0}) {
+        double low = 0.5, high = 3;
+        for (int k = 0; k < 60; ++k) {
+            const double middle = (low + high) / 2;
+            (student_cdf(middle, freedom) < one_sigma ? low : high) = middle;
+        }
+        EXPECT_NEAR(student_one_sigma(freedom), low, (freedom < 3 ? 0.01 : 0.005) * low) << freedom;
+    }
+    EXPECT_GE(student_one_sigma(0), student_one_sigma(1));
+}
+
+TEST(Accuracy, MomentsAreMeanAndVariance) {
+    std::mt19937 random(1);
+    std::normal_distribution<float> normal;
+    constexpr size_t n = 50;
+    constexpr int runs = 7;
+    Moments moments;
+    std::vector<std::vector<float>> values(runs, std::vector<float>(n));
+    for (int r = 0; r < runs; ++r) {
+        for (size_t i = 0; i < n; ++i) values[r][i] = 1e4f + normal(random);  // a mean that cancels
+        moments.add(values[r]);
+    }
+    EXPECT_EQ(moments.count(), runs);
+    for (size_t i = 0; i < n; ++i) {
+        double mean = 0, squares = 0;
+        for (const auto& v : values) mean += v[i] / static_cast<double>(runs);
+        for (const auto& v : values) squares += (v[i] - mean) * (v[i] - mean);
+        EXPECT_NEAR(moments.mean()[i], mean, 1e-9);
+        EXPECT_NEAR(moments.variance(i), squares / (runs - 1), 1e-7);
+    }
+}
+
+TEST(Accuracy, ErrorScaleFloorsAtOnePercentOfTheMean) {
+    const std::vector<double> scale = error_scale({1, 3, 0, -2});
+    EXPECT_EQ(scale, (std::vector<double>{1, 3, 0.015, 2}));
+    EXPECT_EQ(error_scale({0, 0}), (std::vector<double>{0, 0}));
+}
+
+struct Coverage {
+    double within[3] = {};  // 1, 2, 3 sigma
+    void expect_near_normal(double tolerance) const {
+        const double normal[3] = {0.6827, 0.9545, 0.9973};
+        for (int k = 0; k < 3; ++k) EXPECT_NEAR(within[k], normal[k], tolerance) << k + 1 << " sigma";
+    }
+};
+
+// Tables of n_lights x n_views rows whose noise is row factor x column factor, spread log-normally by
+// `spread`; `residual` spreads single rows around that.
+Coverage coverage(int n_lights, int n_views, int runs, double spread, double residual, unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    Coverage result;
+    const int rows = n_lights * n_views, tables = 60000 / rows;
+    for (int table = 0; table < tables; ++table) {
+        RowGroups groups;
+        groups.n_lights = n_lights, groups.n_views = n_views;
+        std::vector<double> of_light(n_lights), of_view(n_views), truth(rows), sigma(rows);
+        for (double& v : of_light) v = std::exp(spread * normal(random));
+        for (double& v : of_view) v = std::exp(spread * normal(random));
+        for (int r = 0; r < rows; ++r) {
+            groups.light.push_back(r / n_views);
+            groups.view.push_back(r % n_views);
+            truth[r] = 0.2 * std::exp(0.3 * normal(random));
+            sigma[r] = 0.003 * truth[r] * of_light[r / n_views] * of_view[r % n_views] *
+                       std::exp(residual * normal(random));
+        }
+        // A second slice in front, to see that `first` is respected.
+        Moments moments;
+        std::vector<float> values(2 * rows, 1.0f);
+        for (int k = 0; k < runs; ++k) {
+            for (int r = 0; r < rows; ++r)
+                values[rows + r] = static_cast<float>(truth[r] + sigma[r] * normal(random));
+            moments.add(values);
+        }
+        const std::vector<double> se = standard_errors(moments, rows, groups);
+        for (int r = 0; r < rows; ++r)
+            for (int k = 0; k < 3; ++k)
+                result.within[k] += std::abs(moments.mean()[rows + r] - truth[r]) < (k + 1) * se[r];
+    }
+    for (double& share : result.within) share /= tables * rows;
+    return result;
+}
+
+TEST(Accuracy, StandardErrorsCoverAsTheyShould) {
+    for (const int runs : {4, 8})
+        for (const double spread : {0.0, 0.4})
+            for (const auto& [lights, views] : {std::pair{12, 12}, {30, 5}}) {
+                SCOPED_TRACE(testing::Message()
+                             << lights << " x " << views << ", " << runs << " runs, spread " << spread);
+                coverage(lights, views, runs, spread, 0, 1).expect_near_normal(0.02);
+            }
+}
+
+// Where views have few rows or only one, there is little to learn their factors from, yet the table is there
+// to be pooled over.
+TEST(Accuracy, StandardErrorsCoverTablesOfFewLights) {
+    for (const int runs : {4, 8}) {
+        SCOPED_TRACE(testing::Message() << runs << " runs");
+        coverage(1, 64, runs, 0, 0, 3).expect_near_normal(0.02);
+        coverage(3, 40, runs, 0, 0, 3).expect_near_normal(0.02);
+        coverage(3, 40, runs, 0.4, 0, 3).expect_near_normal(0.05);
+        coverage(1, 64, runs, 0.2, 0, 3).expect_near_normal(0.05);
+        coverage(64, 1, runs, 0.2, 0, 3).expect_near_normal(0.05);
+        coverage(1, 8, runs, 0.2, 0, 3).expect_near_normal(0.05);
+    }
+}
+
+// Rows that the model of factors does not fit to the last: the tails suffer first, for one prior serves all.
+TEST(Accuracy, StandardErrorsCoverUnevenTables) {
+    for (const int runs : {4, 8, 16}) {
+        SCOPED_TRACE(testing::Message() << runs << " runs");
+        coverage(12, 12, runs, 0.4, 0.25, 4).expect_near_normal(0.03);
+    }
+}
+
+// A lone value has nothing to pool with: one sigma is Student's, wider ones are his longer tails.
+TEST(Accuracy, LoneValuesCoverOneSigma) {
+    for (const int runs : {4, 8})
+        EXPECT_NEAR(coverage(1, 1, runs, 0, 0, 5).within[0], 0.6827, 0.01) << runs << " runs";
+}
+
+TEST(Accuracy, RowsWithoutLightOrNoiseHaveNoError) {
+    RowGroups groups;
+    groups.light = {0, 0, 1, 1}, groups.view = {0, 1, 0, 1};
+    groups.n_lights = groups.n_views = 2;
+    Moments constant, black;
+    for (int k = 0; k < 4; ++k) {
+        constant.add({1, 2, 3, 4});
+        black.add({0, 0, 0, 0});
+    }
+    for (const Moments* moments : {&constant, &black})
+        for (const double se : standard_errors(*moments, 0, groups)) EXPECT_EQ(se, 0);
+}
+
+}  // namespace
+}  // namespace gonio
