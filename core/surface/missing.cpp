@@ -25,6 +25,11 @@ size_t fill_missing(Grid& grid) {
     if (missing.empty()) return 0;
     if (missing.size() == count)
         throw Error(ErrorCode::invalid_input, "/surface", "", "every point of the surface is missing");
+    constexpr size_t most_missing = 1 << 22;  // one hole of so many points takes some 4 GB to solve
+    if (missing.size() > most_missing)
+        throw Error(ErrorCode::limit, "/surface/missing", std::to_string(missing.size()) + " missing points",
+                    "at most " + std::to_string(most_missing) +
+                        " can be interpolated; crop the surface to its measured part");
     known_mean /= static_cast<double>(count - missing.size());
 
     // The edges of the grid are free (no flux), whatever the boundary will be: a seam must not bleed into a
@@ -53,14 +58,10 @@ size_t fill_missing(Grid& grid) {
     }
     Eigen::SparseMatrix<double> laplacian(n, n);
     laplacian.setFromTriplets(entries.begin(), entries.end());
-    Eigen::ConjugateGradient<Eigen::SparseMatrix<double>, Eigen::Lower | Eigen::Upper,
-                             Eigen::IncompleteCholesky<double>>
-        solver;
-    solver.setTolerance(1e-10);
-    const Eigen::VectorXd heights = solver.compute(laplacian).solve(right);
-    if (solver.info() != Eigen::Success)
-        throw Error(ErrorCode::invalid_input, "/surface/missing", std::to_string(n) + " missing points",
-                    "the interpolation did not converge; crop the surface to its measured part");
+    // Directly: conjugate gradients need as many steps as a hole is wide, 3 times the time for a hole of 600
+    // x 600 points.
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(laplacian);
+    const Eigen::VectorXd heights = solver.solve(right);
     for (int row = 0; row < n; ++row) grid.heights[missing[row]] = heights[row] + known_mean;
     return missing.size();
 }
