@@ -59,7 +59,7 @@ ordered_json to_json(const Report& report) {
             {"settings", object(report.settings)},
             {"skipped", object(report.skipped)},
             {"counters", object(report.counters)},
-            {"cpu_seconds", object(report.seconds)},
+            {"seconds", object(report.seconds)},
             {"directional_albedo", report.directional_albedo},
             {"warnings", report.warnings}};
 }

@@ -72,7 +72,7 @@ void print_report(const Report& report, std::ostream& out) {
     for (const auto& [what, why] : report.skipped) out << padded("skipped") << what << ": " << why << "\n";
     for (const auto& [what, count] : report.counters) out << padded(what) << number_text(count, 6) << "\n";
     for (const auto& [stage, seconds] : report.seconds) {
-        out << padded(stage) << number_text(seconds, 3) << " s of CPU\n";
+        out << padded(stage) << number_text(seconds, 3) << " s\n";
     }
     for (const std::string& warning : report.warnings) out << padded("warning") << warning << "\n";
     out << std::flush;

@@ -22,7 +22,7 @@ int execute_job(const Job& job, const CommonOptions& common,
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
                      const CommonOptions& common);
 
-// What exit codes mean: README.md.
+// 1 failed, 2 wrong usage, 3 invalid input, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
 int exit_code(ErrorCode code);
 
 }  // namespace gonio

@@ -113,6 +113,14 @@ void add_measure_flags(CLI::App& command, JobFlags& flags) {
         });
 }
 
+void name_other_flags(JobFlags& flags) {
+    flags.name("/material/albedo", "--albedo");
+    flags.name("/measure/incident", "--incident");
+    flags.name("/measure/outgoing", "--outgoing");
+    flags.name("/output", "--output");
+    flags.name("/surface", "SURFACE");
+}
+
 }  // namespace
 
 void add_measure(CLI::App& app, CommonOptions& common, Action& action) {
@@ -134,6 +142,7 @@ void add_measure(CLI::App& app, CommonOptions& common, Action& action) {
     sub->add_option("--outgoing", command->outgoing, "The same for the viewing side")
         ->group("Directions (degrees)");
     add_measure_flags(*sub, command->flags);
+    name_other_flags(command->flags);
     sub->add_option("-o,--output", command->outputs, "Table to write: .csv, .json or .exr; may be repeated")
         ->take_all();
     sub->add_flag("--print-job", command->print_job, "Print the job document and run nothing");

@@ -66,10 +66,15 @@ std::vector<JobEntry> JobFlags::entries() const {
 }
 
 std::string JobFlags::flag_for(const std::string& pointer) const {
+    // Elements of a list belong to its flag: "/measure/incident/theta_deg/2".
+    const auto is_part_of = [&](const std::string& whole) {
+        return pointer == whole || pointer.starts_with(whole + "/");
+    };
     for (const Value& value : values_) {
-        // Elements of a list belong to its flag: "/measure/incident/theta_deg/2".
-        const bool inside = pointer.starts_with(value.flag.pointer + "/");
-        if (pointer == value.flag.pointer || inside) return value.flag.flag;
+        if (is_part_of(value.flag.pointer)) return value.flag.flag;
+    }
+    for (const auto& [whole, flag] : names_) {
+        if (is_part_of(whole)) return flag;
     }
     return pointer;
 }

@@ -51,6 +51,8 @@ struct JobFlag {
 class JobFlags {
   public:
     void add(CLI::App& command, const std::vector<JobFlag>& flags);
+    // Names a flag that is read elsewhere but stands for a part of the document, for flag_for.
+    void name(const std::string& pointer, const std::string& flag) { names_.emplace_back(pointer, flag); }
     std::vector<JobEntry> entries() const;
     // "--width" for the pointer "/surface/width"; the pointer itself if no flag stands for it.
     std::string flag_for(const std::string& pointer) const;
@@ -62,6 +64,7 @@ class JobFlags {
         CLI::Option* option = nullptr;
     };
     std::list<Value> values_;  // CLI11 keeps the addresses
+    std::vector<std::pair<std::string, std::string>> names_;
 };
 
 // SURFACE or --generate, with every key of "/surface".

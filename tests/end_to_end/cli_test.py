@@ -22,7 +22,7 @@ COMMANDS = ["measure", "run", "batch", "info", "reference", "plot", "ndf", "sche
 
 # A flat plane is answered exactly and at once; a V-groove needs the engine.
 PLANE = {"generate": "plane", "samples": 2, "pitch": "1 mm"}
-GROOVE = {"generate": "v_groove", "samples": 16, "period": "1 mm", "slope_deg": 45}
+GROOVE = {"generate": "v_groove", "samples": 16, "period": "1mm", "slope_deg": 45}
 # Minutes of work: nothing may finish it but Ctrl-C.
 ENDLESS_SURFACE = {"generate": "gaussian", "samples": 512, "pitch": "1 um", "correlation_length": "4 um", "rms_slope": 1}
 
@@ -173,7 +173,7 @@ class Run(Program):
         answer = fails("no unit", job({"file": LAVA, "width": 50, "height_range": "5 mm"}), "/surface/width = 50", "mm")
         self.assertEqual((answer["code"], answer["field"], answer["value"]), ("missing_unit", "/surface/width", "50"))
         fails("a unit that the file lacks", job({"file": LAVA, "width": "50 mm"}), "/surface/height_")
-        fails("no such file", job({"file": "nowhere.png", "width": "5 mm", "height_range": "1 mm"}), "nowhere.png: no such file")
+        fails("no such file", job({"file": "nowhere.png", "width": "5 mm", "height_range": "1 mm"}), "nowhere.png: ", "no such file")
         fails("key written twice", '{"surface": {}, "surface": {}}', "/surface", "twice")
         fails("deep", "[" * 100000, "nested")
         everything = {"hemisphere": 1 << 20}
@@ -235,19 +235,17 @@ class Measure(Program):
         base = ["measure", LAVA, "--width", "50mm", "--height-range", "5mm"]
         for arguments, word in [
             (["measure", LAVA, "--height-range", "5mm"], "--width"),
-            ([*base, "--width", "50"], "--width"),
+            (["measure", LAVA, "--height-range", "5mm", "--width", "50"], '--width = "50"'),
+            ([*base, "--incident", "hemisphere:0"], "--incident = 0"),
             ([*base, "--incident-theta", "0,95"], "--incident-theta = 95"),
             ([*base, "--outgoing-phi", "x"], "--outgoing-phi"),
-            ([*base, "--albedo", "1.5"], "/material/albedo = 1.5"),
+            ([*base, "--albedo", "1.5"], "--albedo = 1.5"),
             ([*base, "--target-error", "2"], "--target-error = 2"),
             ([*base, "--boundary", "tile"], "--boundary"),
             ([*base, "--crop", "0,0,999,9"], "--crop"),
-            (["measure"], "/surface"),
+            (["measure"], "SURFACE"),
         ]:
             with self.subTest(word):
-                # CLI11 keeps the last value of an option given twice only if told so: state --width once.
-                if arguments.count("--width") == 2:
-                    arguments = ["measure", LAVA, "--height-range", "5mm", "--width", "50"]
                 self.assertIn(word, self.gonio(*arguments, code=3).stderr)
 
 
