@@ -53,6 +53,9 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
         all += relative;
     }
     all /= static_cast<double>(n);
+    // A light or view of few rows is itself drawn towards the whole table: with one row each it would predict
+    // only itself.
+    constexpr double factor_prior = 4;  // rows
     // What the prior is worth: nothing for a lone value, five runs in a table.
     const double prior_freedom = std::min(5.0, 0.5 * static_cast<double>(n - 1)),
                  freedom = runs - 1 + prior_freedom;
@@ -61,8 +64,9 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
     for (size_t r = 0; r < n; ++r) {
         if (!(scale[r] > 0) || !(all > 0)) continue;
         const int l = groups.light[r], v = groups.view[r];
-        const double predicted =
-            of_light[l] / rows_of_light[l] * (of_view[v] / rows_of_view[v]) / all * scale[r] * scale[r];
+        const double light_factor = (of_light[l] + factor_prior * all) / (rows_of_light[l] + factor_prior);
+        const double view_factor = (of_view[v] + factor_prior * all) / (rows_of_view[v] + factor_prior);
+        const double predicted = light_factor * view_factor / all * scale[r] * scale[r];
         const double variance =
             ((runs - 1) * moments.variance(first + r) + prior_freedom * predicted) / freedom;
         se[r] = t * std::sqrt(variance / runs);

@@ -200,7 +200,7 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
     const int first = stage.f.count();
     const bool transport = context_.indirect && context_.max_order != 1;
     context_.keep_first = transport && first == 0 && stage.settings.tiles_x == 0;
-    if (transport && first == 0 && stage.settings.tiles_x > 0)
+    if (transport && !stage.noise && stage.settings.tiles_x > 0)
         stage.noise = measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_);
     std::vector<RunValues> runs(n_runs);
     int done = 0;
@@ -269,7 +269,7 @@ bool Measurement::ends_in_time(const Stage& stage, NextStep& step) const {
         return true;
     }
     step.more_runs = 2;
-    return stage.f.count() < most_runs && wall(2, 1) <= left;
+    return stage.f.count() < most_window_runs && wall(2, 1) <= left;
 }
 
 void Measurement::measure() {
@@ -297,10 +297,13 @@ void Measurement::measure() {
             run_stage(stages.back(), step.more_runs);
         } else {
             const bool finer = step.settings.refinement != stages.back().settings.refinement;
-            const int stage_number = static_cast<int>(stages.size());
-            stages.emplace_back();
-            stages.back().settings = step.settings;
-            stages.back().number = stage_number;
+            Stage next;
+            next.settings = step.settings;
+            next.number = static_cast<int>(stages.size());
+            const RunSettings& now = stages.back().settings;
+            if (next.settings.tiles_x > 0 && next.settings.directions == now.directions && !finer)
+                next.noise = stages.back().noise;
+            stages.push_back(std::move(next));
             run_stage(stages.back(), runs_at_first);
             if (finer) find_mesh_bias(stages);
         }
@@ -344,7 +347,8 @@ void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& 
         {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
                                                 number(100 * mesh_bias_.correction) + " %"
                                           : "guessed from the relief"},
-        {"noise_bias", "corrected by " + number(-100 * stages.back().noise.kappa) + " % of the direct part"},
+        {"noise_bias", "corrected by " + number(stages.back().noise ? -100 * stages.back().noise->kappa : 0) +
+                           " % of the direct part"},
         {"relative_error", number(e.total)}};
     report.counters = {
         {"rays", totals_.rays},

@@ -27,9 +27,9 @@ double direct_part(const RunContext& context, const Stage& stage, size_t channel
 // NoiseBias is that of the largest albedo.
 double kappa_of_channel(const RunContext& context, const Stage& stage, size_t channel) {
     const Lambertian& m = *context.material;
-    if (m.is_map()) return stage.noise.kappa;
-    return stage.noise.kappa *
-           std::pow(m.albedo[channel] / *std::max_element(m.albedo.begin(), m.albedo.end()), 2);
+    const double kappa = stage.noise ? stage.noise->kappa : 0.0;
+    if (m.is_map()) return kappa;
+    return kappa * std::pow(m.albedo[channel] / *std::max_element(m.albedo.begin(), m.albedo.end()), 2);
 }
 
 }  // namespace
@@ -65,7 +65,8 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
     for (size_t s = 0; s < used.size(); ++s) {
         const Stage& stage = *used[s];
         const double share = weight[s] / weights;
-        const double noise_doubt = stage.noise.kappa > 0 ? stage.noise.uncertainty / stage.noise.kappa : 0.0;
+        const double noise_doubt =
+            stage.noise && stage.noise->kappa > 0 ? stage.noise->uncertainty / stage.noise->kappa : 0.0;
         for (size_t c = 0; c < n_channels; ++c) {
             const double kappa = kappa_of_channel(context, stage, c);
             for (size_t slice = 0; slice < slices; ++slice)

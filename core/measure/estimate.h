@@ -1,5 +1,7 @@
 // From stages of independent runs to the values, standard errors and biases of a table.
 #pragma once
+#include <optional>
+
 #include "measure/accuracy.h"
 #include "measure/mesh_bias.h"
 #include "measure/noise_bias.h"
@@ -11,9 +13,9 @@ namespace gonio {
 struct Stage {
     RunSettings settings;
     int number = 0;
-    Moments f, direct;     // of RunValues::f and RunValues::direct
-    double remainder = 0;  // largest of its runs
-    NoiseBias noise;
+    Moments f, direct;               // of RunValues::f and RunValues::direct
+    double remainder = 0;            // largest of its runs
+    std::optional<NoiseBias> noise;  // found once a stage, or taken over from one that samples K alike
 };
 
 struct Estimate {

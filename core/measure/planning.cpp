@@ -92,17 +92,22 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
     const double left =
         std::sqrt(std::max(target * target - e.systematic * e.systematic, 0.04 * target * target));
     const double excess = e.random / left;
-    if (next.tiles_x > 0) {  // most of the error is which part of the surface was seen
+    if (next.tiles_x > 0) {  // most of the error is which part of the surface was seen: more windows
         const auto [full_x, full_y] = covering_windows(context);
+        const double runs_needed = std::ceil(1.2 * stage.f.count() * excess * excess);
+        if (runs_needed <= most_window_runs) {
+            step.more_runs = std::max(1, static_cast<int>(runs_needed) - stage.f.count());
+            return decided();
+        }
         if (next.tiles_x < full_x || next.tiles_y < full_y) {
-            const double factor = std::clamp(1.15 * excess, 1.2, 4.0);
-            next.tiles_x = std::min(full_x, static_cast<int>(std::ceil(next.tiles_x * factor)));
-            next.tiles_y = std::min(full_y, static_cast<int>(std::ceil(next.tiles_y * factor)));
+            const double windows = std::ceil(runs_needed * next.tiles_x * next.tiles_y / runs_at_first);
+            const double shape = static_cast<double>(full_x) / full_y;
+            next.tiles_x = std::clamp(static_cast<int>(std::ceil(std::sqrt(windows * shape))), 1, full_x);
+            next.tiles_y = std::clamp(static_cast<int>(std::ceil(windows / next.tiles_x)), 1, full_y);
             RunSettings whole = next;
             whole.tiles_x = whole.tiles_y = 0;
             const bool open = context.surface->border_x > 0 || context.surface->border_y > 0;
-            if (!open && worked_cells(context, next) > cells(context) && run_fits(context, whole))
-                next = whole;
+            if (!open && worked_cells(context, next) > cells(context) && run_fits(context, whole)) next = whole;
             return decided();
         }
     }
