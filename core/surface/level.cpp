@@ -22,7 +22,6 @@ struct Axis {
             norm1 += p1[i] * p1[i];
             norm2 += p2[i] * p2[i];
         }
-        if (n < 3) norm2 = 0;  // p2 vanishes on one or two nodes, but for rounding
     }
 };
 

@@ -340,6 +340,7 @@ TEST(Png, ColourMustBeGreyAndTheErrorNamesTerrainRgb) {
     const Error e = error_of("a.png", png(2, 1, PNG_COLOR_TYPE_RGB, 8, {7, 7, 7, 1, 134, 160}));
     EXPECT_NE(std::string(e.what()).find("Terrain-RGB"), std::string::npos);
     EXPECT_EQ(e.value(), "column 1, row 0");
+    error_of("a.png", png(1, 1, PNG_COLOR_TYPE_RGB, 8, {7, 7, 8}));  // one channel alone
 }
 
 TEST(Png, TransparencyAndPalettesAreRefused) {
