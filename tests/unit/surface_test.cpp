@@ -255,6 +255,16 @@ TEST(Statistics, MatchTheSlowWayOnNonSquarePitch) {
     EXPECT_NEAR(t.height_min, *std::min_element(heights.begin(), heights.end()), 1e-6);
 }
 
+TEST(Statistics, TheSteepestFacetMayBeOfEitherKind) {
+    // One cell, open so that no facet crosses the seam. One corner high: only the facet that has this corner
+    // is steep.
+    for (const std::vector<double>& corner : {std::vector<double>{0, 1, 0, 0}, {0, 0, 1, 0}}) {
+        HeightField s = make_height_field(2, 2, 1, 1, corner);
+        s.border_x = s.border_y = 1;
+        EXPECT_NEAR(surface_statistics(s).max_slope, std::sqrt(2.0), 1e-6);
+    }
+}
+
 TEST(Statistics, SinusoidInClosedForm) {
     const SurfaceStatistics t = surface_statistics(generate_sinusoid(1000, 1.0, 0.1));
     EXPECT_NEAR(t.sq, 0.1 / std::sqrt(2.0), 1e-6);
