@@ -56,10 +56,12 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
     // A light or view of few rows is itself drawn towards the whole table: with one row each it would predict
     // only itself.
     constexpr double factor_prior = 4;  // rows
-    // What the prior is worth: nothing for a lone value, five runs in a table.
-    const double prior_freedom = std::min(5.0, 0.5 * static_cast<double>(n - 1)),
+    // What the prediction is worth: one run in a table, nothing for a lone value. Not more: all values of a
+    // run share its shifts, so the level of the whole table's variance is no better known than from `runs`
+    // runs, whatever the number of rows.
+    const double prior_freedom = std::min(1.0, 0.5 * static_cast<double>(n - 1)),
                  freedom = runs - 1 + prior_freedom;
-    const double t = student_one_sigma(freedom);
+    const double t = student_one_sigma(runs - 1 + 0.5 * prior_freedom);
     std::vector<double> se(n, 0.0);
     for (size_t r = 0; r < n; ++r) {
         if (!(scale[r] > 0) || !(all > 0)) continue;

@@ -80,14 +80,16 @@ class Measurement {
     template <class Value>
     void fill_exact(Value&& value) {
         Table& table = result_.table;
-        table.orders = plan_.separate_orders ? 1 : 0;
+        table.orders = plan_.separate_orders ? std::max(1, plan_.max_order) : 0;
         const size_t n = table.channels.size() * table.slices() * table.rows();
-        table.f.resize(n);
+        table.f.assign(n, 0.0f);
         table.se.assign(n, 0.0f);
         table.bias.assign(n, 0.0f);
         for (size_t c = 0; c < table.channels.size(); ++c)
-            for (size_t k = 0; k < table.slices() * table.rows(); ++k)
-                table.f[c * table.slices() * table.rows() + k] = static_cast<float>(value(c));
+            for (size_t slice = 0; slice < std::min<size_t>(2, table.slices());
+                 ++slice)  // what there is, is first order
+                std::fill_n(table.f.begin() + static_cast<long>(table.index(c, slice, 0)), table.rows(),
+                            static_cast<float>(value(c)));
         result_.report.settings.push_back({"transport", "closed form"});
     }
 
@@ -195,34 +197,57 @@ class Measurement {
 };
 
 void Measurement::run_stage(Stage& stage, int n_runs) {
-    const int outer = std::min(options_.n_threads, n_runs), inner = std::max(1, options_.n_threads / outer);
-    context_.max_bytes = static_cast<long long>(0.8 * static_cast<double>(options_.max_bytes)) / outer;
+    // What is decided from memory must not depend on the number of threads: a run gets the same share on any
+    // machine, and memory limits how many go side by side.
+    const int n_views = context_.view_to_light.empty() ? static_cast<int>(context_.views.size()) : 0,
+              n_lights = static_cast<int>(context_.lights.size());
+    const double bytes = std::min(run_bytes(context_, stage.settings, n_lights, n_views),
+                                  static_cast<double>(context_.max_bytes));
+    const int room = std::max(1, static_cast<int>(0.8 * static_cast<double>(options_.max_bytes) / bytes));
+    const int outer = std::min({options_.n_threads, n_runs, room}),
+              inner = std::max(1, options_.n_threads / outer);
     const int first = stage.f.count();
     const bool transport = context_.indirect && context_.max_order != 1;
-    context_.keep_first = transport && first == 0 && stage.settings.tiles_x == 0;
-    if (transport && !stage.noise && stage.settings.tiles_x > 0)
+    // K g of all runs is kept where memory allows: else a side measurement tells the noise bias.
+    const int kept_columns = context_.view_to_light.empty() ? std::min(n_lights, n_views) : n_lights;
+    const double kept_bytes = 4.0 * 2 * n_runs * kept_columns * scene_.surface.nx * scene_.surface.ny *
+                              std::pow(stage.settings.refinement, 2);
+    context_.keep_first = transport && first == 0 && stage.settings.tiles_x == 0 &&
+                          kept_bytes < 0.1 * static_cast<double>(options_.max_bytes);
+    if (transport && !stage.noise && !context_.keep_first)
         stage.noise = measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_);
     std::vector<RunValues> runs(n_runs);
     int done = 0;
     const double began = seconds();
-    parallel_for(n_runs, outer, [&](int r) {
-        runs[r] = run_once(context_, stage.settings, stage.number, first + r, inner, monitor_);
+    auto run = [&](int r, int n_threads) {
+        runs[r] = run_once(context_, stage.settings, stage.number, first + r, n_threads, monitor_);
         const std::lock_guard lock(mutex_);
         ++done;
         monitor_.report({static_cast<double>(done) / n_runs,
                          "runs of stage " + std::to_string(stage.number + 1), result_.report.relative_error});
-    });
+    };
+    int alone = 0;
+    if (plan_.separate_orders &&
+        context_.single_orders == 0) {  // the first run tells how many orders all of them keep
+        run(alone++, options_.n_threads);
+        context_.fixed_applications = runs[0].applications;
+        context_.single_orders = runs[0].higher_orders + 1;
+    }
+    parallel_for(n_runs - alone, outer, [&](int r) { run(alone + r, inner); });
     seconds_per_run_ = (seconds() - began) / n_runs * outer;
     if (context_.keep_first) {
         std::vector<const Fields*> first_orders;
         for (const RunValues& r : runs) first_orders.push_back(&r.first);
         stage.noise = noise_bias(whole_tile(context_, stage.settings), first_orders, runs[0].first_irradiance,
-                                 scene_.material.is_map() ? 1.0 : albedo_range().second);
+                                 !context_.view_to_light.empty(), options_.n_threads);
     }
     for (const RunValues& r : runs) {
         stage.f.add(r.f);
         stage.direct.add(r.direct);
+        stage.projected_lights.add(r.projected_lights);
+        stage.projected_views.add(r.projected_views);
         stage.remainder = std::max(stage.remainder, r.remainder);
+        stage.ratio = std::max(stage.ratio, r.ratio);
         totals_.rays += r.rays;
         totals_.rays_skipped += r.rays_skipped;
         totals_.links += r.links;
@@ -234,8 +259,6 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
         totals_.seconds_series += r.seconds_series;
         totals_.applications = std::max(totals_.applications, r.applications);
     }
-    // Runs that keep orders apart must agree on how many.
-    if (plan_.separate_orders && plan_.max_order == 0) context_.fixed_applications = totals_.applications;
 }
 
 // The two-grid run is skipped where a guess from the relief is far below what was asked for.
@@ -333,23 +356,25 @@ void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& 
     report.relative_error = e.total;
     report.target_met = wanted == 0 || e.total <= wanted;
     const std::string side = std::to_string(tile_core);
-    report.settings = {
-        {"transport", "diffuse operator"},
-        {"simd", simd_target()},
-        {"sub_samples", std::to_string(last.sub_samples)},
-        {"directions", std::to_string(last.directions)},
-        {"refinement", std::to_string(last.refinement)},
-        {"windows", last.tiles_x == 0 ? "whole period"
-                                      : std::to_string(last.tiles_x * last.tiles_y) + " a run of " + side +
-                                            " x " + side + " cells"},
-        {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) + " in " +
-                     std::to_string(stages.size()) + " stages)"},
-        {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
-                                                number(100 * mesh_bias_.correction) + " %"
-                                          : "guessed from the relief"},
-        {"noise_bias", "corrected by " + number(stages.back().noise ? -100 * stages.back().noise->kappa : 0) +
-                           " % of the direct part"},
-        {"relative_error", number(e.total)}};
+    report.settings = {{"transport", "diffuse operator"},
+                       {"simd", simd_target()},
+                       {"sub_samples", std::to_string(last.sub_samples)},
+                       {"directions", std::to_string(last.directions)},
+                       {"refinement", std::to_string(last.refinement)},
+                       {"windows", last.tiles_x == 0 ? "whole period"
+                                                     : std::to_string(last.tiles_x * last.tiles_y) +
+                                                           " a run of " + side + " x " + side + " cells"},
+                       {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) +
+                                    " in " + std::to_string(stages.size()) + " stages)"},
+                       {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
+                                                               number(100 * mesh_bias_.correction) + " %"
+                                                         : "guessed from the relief"},
+                       {"noise_bias", "corrected by " +
+                                          number(stages.back().noise ? -100 * stages.back().noise->kappa *
+                                                                           std::pow(albedo_range().second, 2)
+                                                                     : 0) +
+                                          " % of the direct part"},
+                       {"relative_error", number(e.total)}};
     report.counters = {
         {"rays", totals_.rays},
         {"rays skipped (steeper than the relief)", totals_.rays_skipped},
@@ -365,6 +390,17 @@ void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& 
         report.skipped.push_back({"shadow tests of steep directions", "they are steeper than every facet"});
     if (last.tiles_x > 0)
         report.skipped.push_back({"most receivers", "windows of the surface reach the error asked for"});
+    int unresolved = 0;
+    for (const Moments* projected : {&stages.back().projected_lights, &stages.back().projected_views})
+        for (const double ratio : projected->mean())
+            unresolved += last.tiles_x == 0 && scene_.surface.border_x == 0 && unresolved_share(ratio) > 0;
+    if (unresolved > 0) {
+        report.counters.push_back(
+            {"directions whose lit slivers were not resolved", static_cast<double>(unresolved)});
+        report.warnings.push_back(std::to_string(unresolved) +
+                                  " directions graze the relief so that samples miss what they light: their "
+                                  "bias column says so; more sub_samples help");
+    }
     if (!report.target_met)
         report.warnings.push_back("target_relative_error " + number(wanted) +
                                   " was not reached: " + number(e.total));

@@ -11,28 +11,51 @@ std::vector<double> part(const std::vector<double>& values, size_t first, size_t
     return {values.begin() + static_cast<long>(first), values.begin() + static_cast<long>(first + n)};
 }
 
-// The first order of a row. Runs keep it for channel 0; a constant albedo scales it, a map's channels share
+// The first order of a row. A constant albedo scales it, a map's channels share
 // its proportion.
 double direct_part(const RunContext& context, const Stage& stage, size_t channel, size_t slices, size_t row) {
     const std::vector<double>& f = stage.f.mean();
     const size_t rows = context.rows();
     if (slices > 1) return f[(channel * slices + 1) * rows + row];
-    const double direct = stage.direct.mean()[row], value = f[channel * rows + row];
-    if (channel == 0) return direct;
+    const double direct = stage.direct.mean()[row];
     const Lambertian& m = *context.material;
-    if (!m.is_map()) return m.albedo[0] > 0 ? direct * m.albedo[channel] / m.albedo[0] : value;
-    return f[row] > 0 ? direct / f[row] * value : 0.0;
+    if (!m.is_map()) return direct * m.albedo[channel];
+    return channel == 0 ? direct : f[row] > 0 ? direct / f[row] * f[channel * rows + row] : 0.0;
 }
 
-// NoiseBias is that of the largest albedo.
-double kappa_of_channel(const RunContext& context, const Stage& stage, size_t channel) {
+// What the noise bias adds to one value, and the uncertainty of that (noise_bias.h). Slice 0 is the sum;
+// single orders k >= 3 grow from order k - 2.
+struct Noisy {
+    double amount = 0, doubt = 0;
+};
+Noisy noise_of(const RunContext& context, const NoiseBias& noise, double ratio, const RowGroups& groups,
+               size_t channel, size_t slice, size_t row, double direct, double indirect,
+               double two_orders_below) {
+    constexpr double doubt_of_higher = 0.15;
     const Lambertian& m = *context.material;
-    const double kappa = stage.noise ? stage.noise->kappa : 0.0;
-    if (m.is_map()) return kappa;
-    return kappa * std::pow(m.albedo[channel] / *std::max_element(m.albedo.begin(), m.albedo.end()), 2);
+    const double albedo = m.is_map() ? 1.0 : m.albedo[channel], kappa = albedo * albedo * noise.kappa;
+    if (slice == 1 || slice == 2) return {};
+    if (slice >= 3) {
+        const double amount = static_cast<double>(slice - 2) * kappa * two_orders_below;
+        return {amount, noise.doubt * amount};
+    }
+    // Sum over j >= 1 of (j + 1) a^j c_j for orders that fall as x^j, and a little for dK K dK, which the two
+    // factors of one sample do not cancel.
+    const double x = std::min(0.9, albedo * ratio), higher = 1.15 * (2 - x) / (1 - x) * kappa * indirect;
+    if (noise.pairs.values.empty())
+        return {kappa * direct + higher, noise.doubt * kappa * direct + doubt_of_higher * higher};
+    const Vec3 &light = context.lights[groups.light[row]], &view = context.views[groups.view[row]];
+    const double pair = noise.pairs(groups.light[row], context.view_to_light[groups.view[row]]);
+    return {albedo * albedo * albedo / pi * pair / (noise.core_area * light.z * view.z) + higher,
+            doubt_of_higher * higher};
 }
 
 }  // namespace
+
+double unresolved_share(double projected_ratio) {
+    const double off = std::abs(projected_ratio - 1);
+    return off > 0.05 ? std::min(off, 1.0) : 0.0;
+}
 
 Estimate make_estimate(const RunContext& context, const RowGroups& groups, const std::vector<Stage>& stages,
                        const MeshBias& mesh_bias, double skipped_bound) {
@@ -65,34 +88,48 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
     for (size_t s = 0; s < used.size(); ++s) {
         const Stage& stage = *used[s];
         const double share = weight[s] / weights;
-        const double noise_doubt =
-            stage.noise && stage.noise->kappa > 0 ? stage.noise->uncertainty / stage.noise->kappa : 0.0;
+        std::vector<double> unresolved(rows, 0.0);
+        if (stage.settings.tiles_x == 0 && context.surface->border_x == 0 && context.surface->border_y == 0)
+            for (size_t r = 0; r < rows; ++r)
+                unresolved[r] =
+                    std::min(1.0, unresolved_share(stage.projected_lights.mean()[groups.light[r]]) +
+                                      unresolved_share(stage.projected_views.mean()[groups.view[r]]));
         for (size_t c = 0; c < n_channels; ++c) {
-            const double kappa = kappa_of_channel(context, stage, c);
             for (size_t slice = 0; slice < slices; ++slice)
                 for (size_t r = 0; r < rows; ++r) {
                     const size_t i = (c * slices + slice) * rows + r;
                     const double f = stage.f.mean()[i], direct = direct_part(context, stage, c, slices, r);
                     const double indirect = slice == 1 ? 0.0 : slice == 0 ? std::max(0.0, f - direct) : f;
-                    // What the noise bias adds (noise_bias.h) to the sum, and to single orders k >= 3.
-                    const double noisy =
-                        kappa * (slice == 0   ? direct + 2 * indirect
-                                 : slice >= 3 ? static_cast<double>(slice - 2) * stage.f.mean()[i - 2 * rows]
-                                              : 0.0);
+                    const double below = slice >= 3 ? stage.f.mean()[i - 2 * rows] : 0.0;
+                    const Noisy noisy = stage.noise ? noise_of(context, *stage.noise, stage.ratio, groups, c,
+                                                               slice, r, direct, indirect, below)
+                                                    : Noisy{};
                     const double continued =
                         slice == 0 ? series_continuation_error * stage.remainder * direct : 0.0;
                     const double skipped = slice == 0 ? skipped_bound * f : 0.0;
-                    e.f[i] += share * (f - noisy + mesh_bias.correction * indirect);
+                    // What could not be sampled: f is at most albedo / (pi cos) on either side, as no facet
+                    // gets more light than the beam carries.
+                    const double lost = unresolved[r],
+                                 ceiling = lost < 1 ? f
+                                                    : 1 / (pi * std::max(context.lights[groups.light[r]].z,
+                                                                         context.views[groups.view[r]].z));
+                    e.f[i] += share * (f - noisy.amount + mesh_bias.correction * indirect);
                     e.se[i] += std::pow(share * se[s][c * slices + slice][r], 2);
-                    e.bias[i] += share * (std::hypot(mesh_bias.uncertainty * indirect, noise_doubt * noisy,
-                                                     continued) +
-                                          skipped);
+                    e.bias[i] +=
+                        share * (std::hypot(mesh_bias.uncertainty * indirect, noisy.doubt, continued) +
+                                 skipped + lost * ceiling);
                 }
         }
     }
     for (double& v : e.se) v = std::sqrt(v);
 
     double random = 0, systematic = 0, direct = 0;
+    const Lambertian& m = *context.material;
+    const size_t brightest =
+        m.is_map()
+            ? 0
+            : static_cast<size_t>(std::max_element(m.albedo.begin(), m.albedo.end()) - m.albedo.begin());
+    const double unit_direct = m.is_map() ? 1.0 : m.albedo[brightest];
     const std::vector<double> direct_se = standard_errors(stages.back().direct, 0, groups);
     for (size_t c = 0; c < n_channels; ++c) {
         const size_t first = c * slices * rows;
@@ -101,7 +138,7 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
             if (!(scale[r] > 0)) continue;
             random += std::pow(e.se[first + r] / scale[r], 2);
             systematic += std::pow(e.bias[first + r] / scale[r], 2);
-            if (c == 0) direct += std::pow(direct_se[r] / scale[r], 2);
+            if (c == brightest) direct += std::pow(unit_direct * direct_se[r] / scale[r], 2);
         }
     }
     const double n = static_cast<double>(rows * n_channels);

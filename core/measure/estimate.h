@@ -9,12 +9,16 @@
 
 namespace gonio {
 
+// How far the sampled projected area of a direction is from the true one, where that is more than noise (5
+// %); else 0. So much of what is seen from there lies in slivers that no sample met.
+double unresolved_share(double projected_ratio);
+
 // Independent runs at the same settings.
 struct Stage {
     RunSettings settings;
     int number = 0;
-    Moments f, direct;               // of RunValues::f and RunValues::direct
-    double remainder = 0;            // largest of its runs
+    Moments f, direct, projected_lights, projected_views;  // of the members of RunValues
+    double remainder = 0, ratio = 0;                       // of the continued orders, largest of its runs
     std::optional<NoiseBias> noise;  // found once a stage, or taken over from one that samples K alike
 };
 

@@ -21,7 +21,7 @@ MeshBias predict_mesh_bias(const HeightField& surface) {
             total += g.x * g.x + g.y * g.y;
         }
     const double roughness = total > 0 ? std::sqrt(change / total) : 0;
-    return {0, 0.014 * std::pow(roughness, 1.5), false};
+    return {0, 0.007 * std::pow(roughness, 1.5), false};
 }
 
 MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, int n_threads,
@@ -68,7 +68,7 @@ MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& setting
     // Error falls with the square of the part's size: half the size leaves a quarter, so the whole error is
     // 4/3 of the difference.
     bias.correction = 4.0 / 3 * mean;
-    bias.uncertainty = 4.0 / 3 * std::sqrt(spread) + 0.3 * std::abs(bias.correction);
+    bias.uncertainty = 0.7 * std::sqrt(spread) + 0.15 * std::abs(bias.correction);
     return bias;
 }
 

@@ -6,31 +6,36 @@
 namespace gonio {
 
 NoiseBias noise_bias(const Tile& tile, const std::vector<const Fields*>& first, const Fields& irradiance,
-                     double largest_albedo) {
-    const int n = irradiance.n_columns(), runs = static_cast<int>(first.size());
+                     bool keep_pairs, int n_threads) {
+    const int n = irradiance.n_columns(), all = first[0]->n_columns(), runs = static_cast<int>(first.size());
     // mean_r <x_r, x_r> - mean_{r != s} <x_r, x_s> = 1 / (R - 1) sum_r <d_r, d_r> with d_r = x_r - mean.
-    Matrix noise(n, n), start(n, n);
+    Matrix noise(all, all), start(n, n);
     for (int r = 0; r < runs; ++r) {
         Combination deviation;
         for (int s = 0; s < runs; ++s) deviation.push_back({first[s], (s == r ? 1.0 : 0.0) - 1.0 / runs});
-        add_products(tile, deviation, deviation, 1.0 / (runs - 1), 1, noise);
+        add_products(tile, deviation, deviation, 1.0 / (runs - 1), n_threads, noise);
     }
     const Combination g{{&irradiance, 1}};
-    add_products(tile, g, g, 1.0, 1, start);
+    add_products(tile, g, g, 1.0, n_threads, start);
     double total_noise = 0, total = 0, spread = 0;
-    for (size_t k = 0; k < noise.values.size(); ++k) {
-        total_noise += noise.values[k];
-        total += start.values[k];
-    }
-    if (!(total > 0)) return {};
-    const double kappa = total_noise / total, mean = total / static_cast<double>(start.values.size());
-    for (size_t k = 0; k < noise.values.size(); ++k)
-        spread +=
-            std::pow((noise.values[k] - kappa * start.values[k]) / std::max(start.values[k], 0.05 * mean),
-                     2) /
-            static_cast<double>(noise.values.size());
-    const double albedo_squared = largest_albedo * largest_albedo;
-    return {albedo_squared * kappa, albedo_squared * (std::sqrt(spread) + 0.3 * kappa)};
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j) {
+            total_noise += noise(i, j);
+            total += start(i, j);
+        }
+    if (!(total > 0 && total_noise > 0)) return {};
+    NoiseBias bias;
+    bias.kappa = total_noise / total;
+    const double mean = total / (static_cast<double>(n) * n);
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j < n; ++j)
+            spread +=
+                std::pow((noise(i, j) / bias.kappa - start(i, j)) / std::max(start(i, j), 0.05 * mean), 2) /
+                (static_cast<double>(n) * n);
+    bias.doubt = std::sqrt(spread);
+    bias.core_area = tile.core_area();
+    if (keep_pairs) bias.pairs = std::move(noise);
+    return bias;
 }
 
 NoiseBias measure_noise_bias(const RunContext& context, const RunSettings& settings, int n_threads,
@@ -53,10 +58,7 @@ NoiseBias measure_noise_bias(const RunContext& context, const RunSettings& setti
         first.emplace_back(tile.n_unknowns(), irradiance.lights.n_columns());
         apply(op, irradiance.lights, first.back(), n_threads);
     }
-    const double albedo = context.material->is_map() ? 0.5
-                                                     : *std::max_element(context.material->albedo.begin(),
-                                                                         context.material->albedo.end());
-    return noise_bias(tile, {&first[0], &first[1]}, irradiance.lights, albedo);
+    return noise_bias(tile, {&first[0], &first[1]}, irradiance.lights, false, n_threads);
 }
 
 }  // namespace gonio

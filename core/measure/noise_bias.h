@@ -6,20 +6,24 @@
 
 namespace gonio {
 
-// dK dK acts nearly as kappa times the identity, so order k is too large by (k - 1) kappa c_{k-2}, and the
-// table by about kappa (direct + 2 indirect), albedo^2 included in kappa. true = computed - kappa (direct + 2
-// indirect).
+// dK dK acts nearly as kappa times the identity, so order k + 1 is too large by k - 1 times kappa c_{k-2},
+// and the table, for albedo a, by about a^2 kappa (direct + 2 indirect). true = computed - that. Where the
+// operator met every pair of directions of the table, the leading term is known per pair and only what
+// follows it is guessed.
 struct NoiseBias {
-    double kappa = 0, uncertainty = 0;
+    double kappa = 0;      // albedo not included, unless facets carry it
+    double doubt = 0;      // relative uncertainty of kappa for a pair
+    Matrix pairs;          // (lights x lights): sum over the core of <dK g_l, dK g_v>, or empty
+    double core_area = 0;  // of the tile of `pairs`
 };
 
-// From K g of several independent runs over the same tile, `first` of each (one block of the same columns):
-// the cross products of different runs have no such bias, so the mean of <K g, K g> minus that of <K g, K' g>
-// is it. irradiance: g of the same columns (any one run's).
+// From K g of several independent runs over the same tile, `first` of each (the same columns): the cross
+// products of different runs have no such bias, so the mean of <K g, K g> minus that of <K g, K' g> is it.
+// irradiance: g of the first block of those columns (any one run's).
 NoiseBias noise_bias(const Tile& tile, const std::vector<const Fields*>& first, const Fields& irradiance,
-                     double largest_albedo);
+                     bool keep_pairs, int n_threads);
 
-// Two operators over one window of a large surface.
+// Two operators over one window of a large surface, for a few directions.
 NoiseBias measure_noise_bias(const RunContext& context, const RunSettings& settings, int n_threads,
                              const Monitor& monitor);
 

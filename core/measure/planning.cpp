@@ -107,7 +107,8 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
             RunSettings whole = next;
             whole.tiles_x = whole.tiles_y = 0;
             const bool open = context.surface->border_x > 0 || context.surface->border_y > 0;
-            if (!open && worked_cells(context, next) > cells(context) && run_fits(context, whole)) next = whole;
+            if (!open && worked_cells(context, next) > cells(context) && run_fits(context, whole))
+                next = whole;
             return decided();
         }
     }

@@ -5,7 +5,7 @@
 
 namespace gonio {
 
-inline constexpr int runs_at_first = 4, most_runs = 16, most_window_runs = 32;
+inline constexpr int runs_at_first = 6, most_runs = 16, most_window_runs = 32;
 
 RunSettings first_settings(const RunContext& context, double target);
 

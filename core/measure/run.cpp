@@ -195,12 +195,14 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
         for (const Block::Row& row : block.rows) {
             const double projected = sums.projected_lights[row.light] * sums.projected_views[row.view];
             // area cos_i cos_o P_l P_v = projected_l projected_v / area
-            const double scale = projected > 0 ? albedo / pi * sums.core_area / projected : 0.0;
+            const double unit = projected > 0 ? sums.core_area / (pi * projected) : 0.0,
+                         scale = albedo * unit;
             auto put = [&](size_t slice, double f) {
                 values.f[(c * slices + slice) * n_rows + row.row] = static_cast<float>(f);
             };
             const double first = scale * direct(row.light, row.view);
             double total = first;
+            if (c == 0) values.direct[row.row] = static_cast<float>(unit * direct(row.light, row.view));
             if (slices > 1) put(1, first);
             if (context.combine_orders) {
                 if (!higher.empty()) total += scale * higher[0](row.light, row.view);
@@ -215,7 +217,6 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
                 }
             }
             put(0, total);
-            if (c == 0) values.direct[row.row] = static_cast<float>(first);
         }
     }
 }
@@ -361,11 +362,24 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
             sums.add(irradiance, series, tile.core_area());
         }
         if (slices == 0) {
-            slices = context.plan->separate_orders ? values.higher_orders + 2 : 1;
+            const int single = context.single_orders > 0 ? context.single_orders : values.higher_orders + 1;
+            slices = context.plan->separate_orders ? single + 1 : 1;
+            values.projected_lights.assign(context.lights.size(), 1.0f);
+            values.projected_views.assign(context.views.size(), 1.0f);
             values.f.assign(n_channels * slices * n_rows, 0.0f);
             values.direct.assign(n_rows, 0.0f);
         }
         write_rows(context, block, sums, slices, values);
+        for (size_t l = 0; l < block.lights.size(); ++l)
+            values.projected_lights[block.lights[l]] = static_cast<float>(
+                sums.projected_lights[l] / (sums.core_area * context.lights[block.lights[l]].z));
+        if (block.same)
+            for (size_t v = 0; v < context.views.size(); ++v)
+                values.projected_views[v] = values.projected_lights[context.view_to_light[v]];
+        else
+            for (size_t v = 0; v < block.views.size(); ++v)
+                values.projected_views[block.views[v]] = static_cast<float>(
+                    sums.projected_views[v] / (sums.core_area * context.views[block.views[v]].z));
     }
     return values;
 }

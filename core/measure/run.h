@@ -27,6 +27,8 @@ struct RunContext {
     int max_order = 0;
     double series_tolerance = 1e-4;
     int fixed_applications = 0;
+    int single_orders =
+        0;  // slices of single orders to keep; 0: as many as the series gives, if the table wants them
     bool keep_first = false;  // RunValues::first, for the noise bias
     long long max_bytes = 0;  // for one run
 
@@ -55,8 +57,12 @@ struct RunValues {
     // f in 1/sr, [channel][slice][row]; slices as in Table: 0 the sum, then single orders if they are kept
     // apart for the table.
     std::vector<float> f;
-    std::vector<float>
-        direct;  // channel 0: the first order alone, [row]: tells which part of the error dominates
+    // The first order alone, [row]: per unit of a constant albedo, else of a map's channel 0. Tells which
+    // part of the error dominates.
+    std::vector<float> direct;
+    // Sampled over true projected area (exactly 1 for a whole period), per light and view: far from 1 where
+    // no sample met the slivers that are lit.
+    std::vector<float> projected_lights, projected_views;
     // If asked for: the irradiance g of the first block of transported directions, and K g, over the whole
     // period.
     Fields first_irradiance, first;

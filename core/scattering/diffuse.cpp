@@ -61,26 +61,31 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
     const double albedo = options.largest_albedo, start = sampled_inner_product(g, g);
     std::vector<Fields> carried;  // K g, K^2 g, ...
     auto order = [&](int k) { return k == 0 ? &g : &carried[k - 1]; };
-    double weight = 1;  // albedo^M
+    double weight = 1, last_even = start;  // albedo^M, <K^(M-1) g, K^(M-1) g>
     while (2 * result.applications < wanted && result.applications < options.max_applications) {
         monitor.check_cancelled();
         const Fields& before = *order(result.applications);
         carried.push_back(series.next(before));
         ++result.applications;
         weight *= albedo;
-        const double even = sampled_inner_product(carried.back(), carried.back()),
-                     odd = sampled_inner_product(*order(result.applications - 1), carried.back());
-        if (!(even > 0 && odd > 0)) {
+        const double even = sampled_inner_product(carried.back(), carried.back());
+        if (!(even > 0)) {
             result.ratio = result.remainder = 0;
             break;
         }
-        result.ratio = std::min(even / odd, 0.999999);
+        // Per order, from the norms: c_{2M} / c_{2M-1} is no bound where light bounces between two walls (K
+        // has eigenvalues +x and -x). After one application the norm still falls too fast, and the products
+        // tell more.
+        const double by_norm = std::sqrt(even / last_even);
+        const double odd = sampled_inner_product(*order(result.applications - 1), carried.back());
+        result.ratio = std::min(
+            result.applications == 1 && odd > 0 ? std::min(even / odd, 2 * by_norm) : by_norm, 0.999999);
+        last_even = even;
         result.remainder = continuation(weight * weight * even / start, albedo * result.ratio);
         if (enough(result, options)) break;
     }
     const int m = result.applications;
     if (m == 0) return result;
-    if (options.keep_first) result.first = first_block(carried[0]);
 
     if (options.combine) {
         // sum_{k=1}^{2M} = <g, S> + <a^M K^M g, S> with S = sum_{k=1}^{M} a^k K^k g.
@@ -92,6 +97,7 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
             const Combination last{{order(m), 1}};
             add_scaled(series.products(last, last), weight * weight * x / (1 - x), result.higher[0]);
         }
+        if (options.keep_first) result.first = std::move(carried[0]);
         return result;
     }
     for (int k = 1; k <= std::min(wanted, 2 * m); ++k) {
@@ -99,6 +105,7 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
         result.higher.push_back(series.products(a, k % 2 == 0 ? a : b));
     }
     if (options.max_order != 0) result.ratio = result.remainder = 0;
+    if (options.keep_first) result.first = std::move(carried[0]);
     return result;
 }
 
@@ -119,7 +126,7 @@ OrderSeries one_sided_series(const Series& series, const Fields& lights, const F
     while (result.applications < wanted && result.applications < 2 * options.max_applications) {
         monitor.check_cancelled();
         Fields next = series.next(carried.empty() ? source : carried.back());
-        if (options.keep_first && result.applications == 0) result.first = first_block(next);
+        if (options.keep_first && result.applications == 0) result.first = next;
         if (!options.combine) carried.clear();
         carried.push_back(std::move(next));
         ++result.applications;

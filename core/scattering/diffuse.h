@@ -28,7 +28,7 @@ struct OrderSeries {
     // What is beyond the last order continues as a geometric series with this ratio per order (albedo not
     // included): the light has forgotten where it came from. 0 if the orders were limited by the job.
     double ratio = 0;
-    Fields first;          // if asked for: K applied once to the first block of columns of the transported side
+    Fields first;          // if asked for: K applied once to the transported side
     double remainder = 0;  // relative size of that continuation, for the bias estimate
     int applications = 0;
 };

@@ -66,7 +66,7 @@ void add_products(const Tile& tile, const Combination& a, const Combination& b, 
 // does not tell apart.
 void average_parts(const Tile& tile, int coarse_refinement, int n_threads, Fields& fields);
 
-// Estimate of the sum over all values of a * b from every eighth run of 1024 unknowns, in a fixed order:
+// Estimate of the sum over all values of a * b from every eighth run of 16 unknowns (all of a small surface), in a fixed order:
 // enough to judge a series.
 double sampled_inner_product(const Fields& a, const Fields& b);
 

@@ -72,12 +72,15 @@ void add_projected_area(const Tile& tile, const Fields& fields, double scale, st
         double total[column_block] = {};
         for (int part = 0; part < tile.n_parts(); ++part)
             for (const Tile::Run& run : tile.core_runs()) {
-                float lanes[column_block] = {};
-                for (size_t s = run.first; s < run.first + run.count; ++s) {
-                    const float* row = fields.block(block) + (part * tile.n_slots() + s) * column_block;
-                    for (int c = 0; c < column_block; ++c) lanes[c] += tile.sqrt_area[s] * row[c];
+                // Float lanes over few slots, then double: every value of the table is divided by these sums.
+                for (size_t begin = run.first; begin < run.first + run.count; begin += 16) {
+                    float lanes[column_block] = {};
+                    for (size_t s = begin; s < std::min(begin + 16, run.first + run.count); ++s) {
+                        const float* row = fields.block(block) + (part * tile.n_slots() + s) * column_block;
+                        for (int c = 0; c < column_block; ++c) lanes[c] += tile.sqrt_area[s] * row[c];
+                    }
+                    for (int c = 0; c < column_block; ++c) total[c] += lanes[c];
                 }
-                for (int c = 0; c < column_block; ++c) total[c] += lanes[c];
             }
         for (int c = 0; c < column_block && block * column_block + c < static_cast<int>(sums.size()); ++c)
             sums[block * column_block + c] += scale * total[c];

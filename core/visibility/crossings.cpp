@@ -147,6 +147,8 @@ RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const Fa
     double travel = max_travel;
     if (std::abs(rise) > 0) travel = std::min(max_travel, range / std::abs(rise) + 2);
     bundle.truncated = travel == max_travel;
+    // One row: after one period everything repeats below the risen ray.
+    if (plane.ny == 1 && rise >= 0) travel = std::min(travel, plane.nx / std::max(std::abs(dx), 1e-6) + 2);
     const std::vector<RawCrossing> list = list_crossings(u, v, dx, dy, travel);
 
     bundle.crossings.reserve(list.size());
