@@ -47,7 +47,8 @@ void expect_right(const HeightField& surface, const Material& material, BrdfPlan
     const Table table = measure(surface, material, plan).table;
     const Table expected = measure_reference(surface, material, plan, {paths}, {}).table;
     expect_sound(expected);
-    expect_tables_agree(table, expected, 4.5);
+    // Few runs: the largest of a hundred values of Student's t with 8 degrees of freedom.
+    expect_tables_agree(table, expected, 6);
     double worst = 0;
     for (size_t k = 0; k < table.f.size(); ++k)
         worst = std::max(worst, doubt(table, k) / (expected.f[k] + 1e-3));
@@ -94,7 +95,7 @@ TEST(Stress, OffsetOfAMillionPitches) {
 }
 
 // Light and view down to 89.9 degrees on slopes from 1e-6 to 1e3, pitches of 1000:1 either way. Where slivers
-// alone are lit (slope * tan(theta) above 2000: less than a thousandth of each wall) a warning is right, too.
+// alone are lit (slope * tan(theta) above 500: less than 0.4 % of each wall) a warning is right, too.
 TEST(Stress, GroovesOfAnySlopePitchAndAngle) {
     int within_two = 0, n = 0;
     for (const auto& [slope, stretch] : std::vector<std::pair<double, double>>{
@@ -102,7 +103,7 @@ TEST(Stress, GroovesOfAnySlopePitchAndAngle) {
         HeightField groove = generate_v_groove(8, 2, degrees(std::atan(slope)));
         groove.pitch_y = stretch * groove.pitch_x;
         BrdfPlan plan = plan_of({{85, 0}, {89.9, 10}, {89.9, 180}, {60, 90}, {50, 0}, {0, 0}},
-                                {{85, 20}, {89.9, 0}, {30, 45}, {40, 180}}, Accuracy::Samples{48, 16, 1, 8});
+                                {{85, 20}, {89.9, 0}, {30, 45}, {40, 180}}, Accuracy::Samples{16, 16, 1, 6});
         plan.max_order = 1;
         const BrdfResult result = measure(groove, gray({0.9}), plan);
         const Table& table = result.table;
@@ -111,7 +112,7 @@ TEST(Stress, GroovesOfAnySlopePitchAndAngle) {
             const double exact = reference::v_groove_direct(slope, 0.9, plan.incident[i], plan.outgoing[o]);
             const double off = std::abs(table.f[row] - exact), rounding = 2e-5 * exact + 1e-9;
             const double grazing = std::max(plan.incident[i].theta_deg, plan.outgoing[o].theta_deg);
-            if (slope * std::tan(radians(grazing)) > 2000 && !result.report.warnings.empty()) continue;
+            if (slope * std::tan(radians(grazing)) > 500 && !result.report.warnings.empty()) continue;
             EXPECT_LE(off, 5 * doubt(table, row) + rounding)
                 << "slope " << slope << ", stretch " << stretch << ", pair " << i << ", " << o << ": "
                 << table.f[row] << " instead of " << exact;
@@ -129,8 +130,8 @@ TEST(Stress, SpikesPitsAndSteps) {
         return make_height_field(24, 20, 1e-4, 1e-4, heights);
     };
     const BrdfPlan plan = plan_for_target(lights, views, 0.01);
-    expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = 30e-4; }), gray({0.8}), plan, 60000, "spike");
-    expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = -30e-4; }), gray({0.8}), plan, 60000, "hole");
+    expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = 30e-4; }), gray({0.8}), plan, 30000, "spike");
+    expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = -30e-4; }), gray({0.8}), plan, 30000, "hole");
     expect_right(flat_but([](auto& h) { std::fill(h.begin(), h.begin() + 240, 8e-4); }), gray({0.8}), plan,
                  60000, "step");
     // The steepest that is taken at all; one step more is refused as a slip of units.
@@ -230,8 +231,12 @@ TEST(Stress, MillionsOfPairs) {
     const Table all = measure(surface, gray({0.8}), product).table;
     ASSERT_EQ(all.rows(), size_t{n} * n);
 
-    // As a list, in no order.
-    BrdfPlan list = product;
+    // As a list, in no order. The first order alone: what corrects the others is measured on some directions,
+    // and a list may take others.
+    BrdfPlan first = product;
+    first.max_order = 1;
+    const Table direct = measure(surface, gray({0.8}), first).table;
+    BrdfPlan list = first;
     for (int i = 0; i < n; ++i)
         for (int o = 0; o < n; ++o) list.pairs.emplace_back(i, o);
     std::mt19937 random(8);
@@ -240,25 +245,31 @@ TEST(Stress, MillionsOfPairs) {
     size_t different = 0;
     for (size_t row = 0; row < pairs.rows(); ++row) {
         const auto [i, o] = pairs.pair(row);
-        const float expected = all.f[static_cast<size_t>(i) * n + o];
+        const float expected = direct.f[static_cast<size_t>(i) * n + o];
         different += std::abs(pairs.f[row] - expected) > 1e-5f * expected + 1e-7f;
     }
     EXPECT_EQ(different, 0u);
 }
 
 TEST(Stress, SparseListOfPairs) {
-    constexpr int n = 5000;
+    constexpr int n = 3000;
     const HeightField surface = make_height_field(8, 8, 1e-4, 1e-4, noise_heights(8 * 8, 1.5e-4));
     const std::vector<AnglesDeg> hemisphere = equal_projected_hemisphere(n);
-    BrdfPlan list = plan_of(hemisphere, hemisphere, Accuracy::Samples{1, 16, 1, 2});
-    for (int i = 0; i < n; ++i) list.pairs.emplace_back(i, (i * 7) % n);
-    const Table pairs = measure(surface, gray({0.8}), list).table;
-    for (int row = 0; row < n; row += 499) {
-        const auto [i, o] = pairs.pair(row);
-        const Table one = measure(surface, gray({0.8}),
-                                  plan_of({hemisphere[i]}, {hemisphere[o]}, Accuracy::Samples{1, 16, 1, 2}))
-                              .table;
-        EXPECT_NEAR(pairs.f[row], one.f[0], 2e-4 * one.f[0]);
+    for (const int max_order : {1, 0}) {
+        BrdfPlan list = plan_of(hemisphere, hemisphere, Accuracy::Samples{1, 64, 1, 3});
+        list.max_order = max_order;
+        for (int i = 0; i < n; ++i) list.pairs.emplace_back(i, (i * 7) % n);
+        const Table pairs = measure(surface, gray({0.8}), list).table;
+        for (int row = 0; row < n; row += 499) {
+            const auto [i, o] = pairs.pair(row);
+            BrdfPlan single = list;
+            single.incident = {hemisphere[i]}, single.outgoing = {hemisphere[o]};
+            single.pairs.clear();
+            const Table one = measure(surface, gray({0.8}), single).table;
+            const double other_corrections =
+                max_order == 1 ? 0 : 3 * std::hypot(one.bias[0], pairs.bias[row]);
+            EXPECT_NEAR(pairs.f[row], one.f[0], 1e-5 * one.f[0] + other_corrections);
+        }
     }
 }
 
