@@ -306,8 +306,11 @@ class Batch(Program):
 
 class Interruption(Program):
     def start(self, *arguments):
-        return subprocess.Popen([GONIO, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE,
-                                stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen([GONIO, *map(str, arguments)], cwd=self.folder, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)  # first: what a failing test leaves would run for ever
+        return process
 
     def stop(self, process, sent, times=1):
         for _ in range(times):

@@ -229,6 +229,25 @@ TEST(JobDocument, EveryOptionOfAFileArrives) {
     EXPECT_EQ(std::get<FileSurface>(parse_job(document.dump(), {"x", "jobs"}).surface).path, "/absolute.png");
 }
 
+TEST(JobDocument, EveryChoiceIsTheOneNamed) {
+    const auto options = [](const char* key, const char* choice) {
+        json document = base_document();
+        document["surface"] = {{"file", "a.png"}, {key, choice}};
+        return std::get<FileSurface>(parse(document).surface).options;
+    };
+    EXPECT_EQ(options("level", "none").level, Level::none);
+    EXPECT_EQ(options("level", "mean").level, Level::mean);
+    EXPECT_EQ(options("level", "plane").level, Level::plane);
+    EXPECT_EQ(options("level", "quadratic").level, Level::quadratic);
+    EXPECT_EQ(options("boundary", "periodic").boundary, Boundary::periodic);
+    EXPECT_EQ(options("boundary", "mirror").boundary, Boundary::mirror);
+    EXPECT_EQ(options("boundary", "open").boundary, Boundary::open);
+    EXPECT_EQ(options("missing", "reject").missing, Missing::reject);
+    EXPECT_EQ(options("missing", "interpolate").missing, Missing::interpolate);
+    EXPECT_EQ(options("y_axis", "down").y_up, false);
+    EXPECT_FALSE(options("level", "none").y_up);
+}
+
 TEST(JobDocument, ChannelsAreNamed) {
     const auto channels = [](const json& albedo) {
         return parse(base_document({{"material", {{"albedo", albedo}}}})).material.material.channels;
@@ -348,6 +367,13 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
     hashes.push_back(load_job(job, ReferenceOptions{65}).hash);
     std::sort(hashes.begin(), hashes.end());
     EXPECT_EQ(std::unique(hashes.begin(), hashes.end()), hashes.end());
+}
+
+TEST(JobHash, NamesTheProgramThatComputes) {
+    const LoadedJob loaded = load_job(parse(base_document()));
+    const json canonical = json::parse(canonical_job(loaded.surface.hash, loaded.material, loaded.job.plan));
+    EXPECT_EQ(canonical.value("engine", ""), program_version());
+    EXPECT_EQ(canonical.value("surface", ""), loaded.surface.hash);
 }
 
 TEST(JobHash, NamesFilesByContent) {
