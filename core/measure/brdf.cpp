@@ -305,9 +305,21 @@ void Measurement::measure() {
         stages[0].settings = {samples->sub_samples, samples->directions, samples->refinement, 0, 0};
         if (!run_fits(context_, stages[0].settings))
             std::tie(stages[0].settings.tiles_x, stages[0].settings.tiles_y) = covering_windows(context_);
+        // Fewer would let single rays carry more light than there is.
+        const int least = 16 * samples->refinement * samples->refinement;
+        if (samples->directions < least && context_.indirect)
+            throw Error(ErrorCode::invalid_input, "/accuracy/samples/directions",
+                        std::to_string(samples->directions),
+                        "needs at least 16 refinement^2 = " + std::to_string(least));
     } else {
         stages[0].settings = first_settings(context_, wanted > 0 ? wanted : default_target);
     }
+    if (const double least = run_bytes(context_, stages[0].settings, column_block, column_block);
+        least > static_cast<double>(options_.max_bytes))
+        throw Error(ErrorCode::limit, "/surface",
+                    std::to_string(scene_.surface.nx) + " x " + std::to_string(scene_.surface.ny),
+                    "needs " + number(least / 1e6) + " MB of the " +
+                        number(static_cast<double>(options_.max_bytes) / 1e6) + " MB allowed");
     run_stage(stages[0], samples ? std::max(2, samples->replicates) : runs_at_first);
     find_mesh_bias(stages);
 
@@ -340,6 +352,10 @@ void Measurement::measure() {
     table.se.resize(n);
     table.bias.resize(n);
     for (size_t i = 0; i < n; ++i) {
+        if (!std::isfinite(e.f[i]) || !std::isfinite(e.se[i]) || !std::isfinite(e.bias[i]))
+            throw Error(
+                ErrorCode::internal, "/measure", "",
+                "value " + std::to_string(i) + " is not finite: a defect of gonio, please report the job");
         table.f[i] = static_cast<float>(std::max(0.0, e.f[i]));
         table.se[i] = static_cast<float>(e.se[i]);
         table.bias[i] = static_cast<float>(e.bias[i]);
