@@ -186,14 +186,22 @@ struct Sums {
 void write_rows(const RunContext& context, const Block& block, const Sums& sums, size_t slices,
                 RunValues& values) {
     const size_t n_rows = context.rows(), n_channels = context.n_channels();
-    const bool map = context.material->is_map();
+    const bool map = context.material->is_map(),
+               open = context.surface->border_x > 0 || context.surface->border_y > 0;
+    auto view_of = [&](const Block::Row& row) {
+        return block.same ? context.lights[block.lights[row.view]] : context.views[block.views[row.view]];
+    };
     for (size_t c = 0; c < n_channels; ++c) {
         const double albedo = map ? 1.0 : context.material->albedo[c];
         const Matrix& direct = sums.direct[map ? c : 0];
         const std::vector<Matrix>& higher = sums.higher[map ? c : 0];
         const double x = albedo * values.ratio;
         for (const Block::Row& row : block.rows) {
-            const double projected = sums.projected_lights[row.light] * sums.projected_views[row.view];
+            // Of a part of a surface the projected area is not A cos theta in truth: an open surface is
+            // divided by the plain area.
+            const double projected = open ? std::pow(sums.core_area, 2) *
+                                                context.lights[block.lights[row.light]].z * view_of(row).z
+                                          : sums.projected_lights[row.light] * sums.projected_views[row.view];
             // area cos_i cos_o P_l P_v = projected_l projected_v / area
             const double unit = projected > 0 ? sums.core_area / (pi * projected) : 0.0,
                          scale = albedo * unit;
