@@ -55,7 +55,7 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
     all /= static_cast<double>(n);
     // A light or view of few rows is itself drawn towards the whole table: with one row each it would predict
     // only itself.
-    constexpr double factor_prior = 4;  // rows
+    constexpr double factor_prior = 1;  // rows
     // What the prediction is worth: one run in a table, nothing for a lone value. Not more: all values of a
     // run share its shifts, so the level of the whole table's variance is no better known than from `runs`
     // runs, whatever the number of rows.
