@@ -53,21 +53,25 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
         all += relative;
     }
     all /= static_cast<double>(n);
-    // A light or view of few rows is itself drawn towards the whole table: with one row each it would predict
-    // only itself.
-    constexpr double factor_prior = 1;  // rows
-    // What the prediction is worth: one run in a table, nothing for a lone value. Not more: all values of a
+    // A light or view of few rows is itself drawn towards the whole table: with one row it would predict only
+    // itself. Not where rows are many: the table's mean is that of a heavy-tailed set, and most rows would
+    // get too much.
+    auto factor = [&](double sum, int n_rows) {
+        const double prior = std::max(0.0, 2.6 - 0.5 * n_rows);  // rows
+        return (sum + prior * all) / (n_rows + prior);
+    };
+    // What the prediction is worth: 1.6 runs in a table, nothing for a lone value. Not more: all values of a
     // run share its shifts, so the level of the whole table's variance is no better known than from `runs`
     // runs, whatever the number of rows.
-    const double prior_freedom = std::min(1.0, 0.5 * static_cast<double>(n - 1)),
+    const double prior_freedom = std::min(1.6, 0.5 * static_cast<double>(n - 1)),
                  freedom = runs - 1 + prior_freedom;
-    const double t = student_one_sigma(runs - 1 + 0.5 * prior_freedom);
+    const double t = student_one_sigma(freedom);
     std::vector<double> se(n, 0.0);
     for (size_t r = 0; r < n; ++r) {
         if (!(scale[r] > 0) || !(all > 0)) continue;
         const int l = groups.light[r], v = groups.view[r];
-        const double light_factor = (of_light[l] + factor_prior * all) / (rows_of_light[l] + factor_prior);
-        const double view_factor = (of_view[v] + factor_prior * all) / (rows_of_view[v] + factor_prior);
+        const double light_factor = factor(of_light[l], rows_of_light[l]),
+                     view_factor = factor(of_view[v], rows_of_view[v]);
         const double predicted = light_factor * view_factor / all * scale[r] * scale[r];
         const double variance =
             ((runs - 1) * moments.variance(first + r) + prior_freedom * predicted) / freedom;

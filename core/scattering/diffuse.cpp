@@ -73,13 +73,13 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
             result.ratio = result.remainder = 0;
             break;
         }
-        // Per order, from the norms: c_{2M} / c_{2M-1} is no bound where light bounces between two walls (K
-        // has eigenvalues +x and -x). After one application the norm still falls too fast, and the products
-        // tell more.
-        const double by_norm = std::sqrt(even / last_even);
+        // c_{2M} / c_{2M-1} is the last ratio, unless light bounces between two walls (K has eigenvalues +x
+        // and -x and odd orders nearly vanish): then what the norm loses in two orders tells. After one
+        // application that still falls too fast.
+        const double by_norm = std::sqrt(even / last_even),
+                     at_most = (result.applications == 1 ? 2.0 : 1.25) * by_norm;
         const double odd = sampled_inner_product(*order(result.applications - 1), carried.back());
-        result.ratio = std::min(
-            result.applications == 1 && odd > 0 ? std::min(even / odd, 2 * by_norm) : by_norm, 0.999999);
+        result.ratio = std::min(even < at_most * odd ? even / odd : by_norm, 0.999999);
         last_even = even;
         result.remainder = continuation(weight * weight * even / start, albedo * result.ratio);
         if (enough(result, options)) break;
