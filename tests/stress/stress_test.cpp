@@ -43,7 +43,7 @@ std::vector<double> noise_heights(int n, double amplitude) {
 void expect_right(const HeightField& surface, const Material& material, BrdfPlan plan, long long paths,
                   const std::string& what) {
     SCOPED_TRACE(what);
-    plan.accuracy.max_seconds = 5;
+    plan.accuracy.max_seconds = 3;
     const Table table = measure(surface, material, plan).table;
     const Table expected = measure_reference(surface, material, plan, {paths}, {}).table;
     expect_sound(expected);
@@ -59,7 +59,7 @@ TEST(Stress, OnePointIsAPlane) {
     for (const bool allow_skips : {true, false}) {
         const HeightField point = make_height_field(1, 1, 1e-3, 2e-3, {7.0});
         const Table table =
-            measure(point, gray({0.5}), plan_of(lights, views, Accuracy::Samples{1, 4, 1, 2}), allow_skips)
+            measure(point, gray({0.5}), plan_of(lights, views, Accuracy::Samples{1, 16, 1, 2}), allow_skips)
                 .table;
         for (const float f : table.f) EXPECT_NEAR(f, 0.5 / pi, 1e-6);
     }
@@ -79,7 +79,7 @@ TEST(Stress, ConstantHeightFarFromZero) {
         for (const bool allow_skips : {true, false}) {
             const HeightField surface = make_height_field(6, 4, 1e-4, 1e-4, std::vector<double>(24, height));
             const Table table = measure(surface, gray({0.5}),
-                                        plan_of(lights, views, Accuracy::Samples{1, 4, 1, 2}), allow_skips)
+                                        plan_of(lights, views, Accuracy::Samples{1, 16, 1, 2}), allow_skips)
                                     .table;
             for (const float f : table.f) EXPECT_NEAR(f, 0.5 / pi, 1e-6);
         }
@@ -129,7 +129,7 @@ TEST(Stress, SpikesPitsAndSteps) {
         change(heights);
         return make_height_field(24, 20, 1e-4, 1e-4, heights);
     };
-    const BrdfPlan plan = plan_for_target(lights, views, 0.01);
+    const BrdfPlan plan = plan_for_target(lights, views, 0.02);
     expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = 30e-4; }), gray({0.8}), plan, 30000, "spike");
     expect_right(flat_but([](auto& h) { h[10 * 24 + 7] = -30e-4; }), gray({0.8}), plan, 30000, "hole");
     expect_right(flat_but([](auto& h) { std::fill(h.begin(), h.begin() + 240, 8e-4); }), gray({0.8}), plan,
@@ -180,7 +180,7 @@ TEST(Stress, DenormalHeights) {
         for (const bool allow_skips : {true, false}) {
             const HeightField surface = make_height_field(12, 9, 1e-6, 1e-6, noise_heights(12 * 9, size));
             const Table table = measure(surface, gray({0.5}),
-                                        plan_of(lights, views, Accuracy::Samples{1, 8, 1, 2}), allow_skips)
+                                        plan_of(lights, views, Accuracy::Samples{1, 16, 1, 2}), allow_skips)
                                     .table;
             for (const float f : table.f) EXPECT_NEAR(f, 0.5 / pi, 1e-6);
         }
@@ -309,8 +309,12 @@ TEST(Stress, OutOfReachTargetEndsInTime) {
 
 TEST(Stress, LeastAndLoosestAccuracy) {
     const HeightField surface = make_height_field(16, 12, 1e-4, 1e-4, noise_heights(16 * 12, 1.5e-4));
-    measure(surface, gray({0.8}), plan_of(lights, views, Accuracy::Samples{1, 1, 1, 2}));
-    measure(surface, gray({0.8}), plan_of(lights, views, Accuracy::Samples{1, 3, 4, 2}));
+    measure(surface, gray({0.8}), plan_of(lights, views, Accuracy::Samples{1, 16, 1, 2}));
+    measure(surface, gray({0.8}), plan_of(lights, views, Accuracy::Samples{1, 256, 4, 2}));
+    // Parts that no direction leaves from.
+    for (const Accuracy::Samples& too_few : {Accuracy::Samples{1, 1, 1, 2}, Accuracy::Samples{1, 3, 4, 2}})
+        expect_refused([&] { measure(surface, gray({0.8}), plan_of(lights, views, too_few)); },
+                       ErrorCode::invalid_input, "directions");
     EXPECT_TRUE(measure(surface, gray({0.8}), plan_for_target(lights, views, 10)).report.target_met);
     BrdfPlan instant = plan_of(lights, views);
     instant.accuracy.max_seconds = 1e-9;
