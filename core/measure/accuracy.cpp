@@ -57,13 +57,13 @@ std::vector<double> standard_errors(const Moments& moments, size_t first, const 
     // itself. Not where rows are many: the table's mean is that of a heavy-tailed set, and most rows would
     // get too much.
     auto factor = [&](double sum, int n_rows) {
-        const double prior = std::max(0.0, 2.6 - 0.5 * n_rows);  // rows
+        const double prior = std::max(0.0, 2.5 - 0.5 * n_rows);  // rows
         return (sum + prior * all) / (n_rows + prior);
     };
-    // What the prediction is worth: 1.6 runs in a table, nothing for a lone value. Not more: all values of a
+    // What the prediction is worth: 1.5 runs in a table, nothing for a lone value. Not more: all values of a
     // run share its shifts, so the level of the whole table's variance is no better known than from `runs`
     // runs, whatever the number of rows.
-    const double prior_freedom = std::min(1.6, 0.5 * static_cast<double>(n - 1)),
+    const double prior_freedom = std::min(1.5, 0.5 * static_cast<double>(n - 1)),
                  freedom = runs - 1 + prior_freedom;
     const double t = student_one_sigma(freedom);
     std::vector<double> se(n, 0.0);

@@ -155,7 +155,7 @@ class Measurement {
         } else {
             skipped_bound_ = 0;
         }
-        context_.series_tolerance = std::clamp(0.05 * target(), 1e-6, 1e-3);
+        context_.series_tolerance = std::clamp(0.15 * target(), 1e-6, 2e-3);
         if (context_.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
     }
 
@@ -305,12 +305,9 @@ void Measurement::measure() {
         stages[0].settings = {samples->sub_samples, samples->directions, samples->refinement, 0, 0};
         if (!run_fits(context_, stages[0].settings))
             std::tie(stages[0].settings.tiles_x, stages[0].settings.tiles_y) = covering_windows(context_);
-        // Fewer would let single rays carry more light than there is.
-        const int least = 16 * samples->refinement * samples->refinement;
-        if (samples->directions < least && context_.indirect)
-            throw Error(ErrorCode::invalid_input, "/accuracy/samples/directions",
-                        std::to_string(samples->directions),
-                        "needs at least 16 refinement^2 = " + std::to_string(least));
+        // Fewer directions would let single rays carry more light than there is.
+        stages[0].settings.directions =
+            std::max(samples->directions, 16 * samples->refinement * samples->refinement);
     } else {
         stages[0].settings = first_settings(context_, wanted > 0 ? wanted : default_target);
     }
@@ -320,6 +317,7 @@ void Measurement::measure() {
                     std::to_string(scene_.surface.nx) + " x " + std::to_string(scene_.surface.ny),
                     "needs " + number(least / 1e6) + " MB of the " +
                         number(static_cast<double>(options_.max_bytes) / 1e6) + " MB allowed");
+    context_.single_orders = plan_.separate_orders ? plan_.max_order : 0;
     run_stage(stages[0], samples ? std::max(2, samples->replicates) : runs_at_first);
     find_mesh_bias(stages);
 

@@ -105,7 +105,8 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                                                                slice, r, direct, indirect, below)
                                                     : Noisy{};
                     const double continued =
-                        slice == 0 ? series_continuation_error * stage.remainder * direct : 0.0;
+                        slice == 0 ? series_continuation_error * stage.remainder * (direct + 2 * indirect)
+                                   : 0.0;
                     const double skipped = slice == 0 ? skipped_bound * f : 0.0;
                     // What could not be sampled: f is at most albedo / (pi cos) on either side, as no facet
                     // gets more light than the beam carries.
@@ -122,6 +123,15 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
         }
     }
     for (double& v : e.se) v = std::sqrt(v);
+
+    // Limited orders, each corrected on its own: their sum is the sum.
+    if (slices > 1 && context.max_order > 0)
+        for (size_t c = 0; c < n_channels; ++c)
+            for (size_t r = 0; r < rows; ++r) {
+                double& sum = e.f[c * slices * rows + r];
+                sum = 0;
+                for (size_t slice = 1; slice < slices; ++slice) sum += e.f[(c * slices + slice) * rows + r];
+            }
 
     double random = 0, systematic = 0, direct = 0;
     const Lambertian& m = *context.material;

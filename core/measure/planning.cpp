@@ -67,8 +67,11 @@ RunSettings first_settings(const RunContext& context, double target) {
     const double direct = 0.0011 * (slope / 0.7) * std::sqrt(16384 / measured_cells),
                  indirect = 0.0075 * std::pow(slope / 0.7, 1.5);
     settings.sub_samples = std::clamp(static_cast<int>(std::ceil(std::pow(direct / share, 1.25))), 1, 64);
-    settings.directions =
-        std::clamp(static_cast<int>(16 * std::ceil(std::pow(indirect / share, 1 / 1.7))), 16, 1024);
+    // Few facets average little: the operator of a single row needs more directions, and they cost little
+    // there.
+    const double few_facets = std::max(1.0, std::sqrt(16384 / measured_cells));
+    settings.directions = std::clamp(
+        static_cast<int>(16 * few_facets * std::ceil(std::pow(indirect / share, 1 / 1.7))), 16, 1024);
     return settings;
 }
 

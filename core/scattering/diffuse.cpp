@@ -43,6 +43,10 @@ void add_scaled(const Matrix& from, double scale, Matrix& to) {
     for (size_t k = 0; k < to.values.size(); ++k) to.values[k] += scale * from.values[k];
 }
 
+// Light is lost to the sky at every bounce: a ratio closer to 1 is sampling noise, and its continuation would
+// be, too.
+constexpr double largest_ratio = 0.99;
+
 // Relative size of the geometric continuation after a last order that holds `share` of the direct term.
 double continuation(double share, double ratio) {
     return ratio < 1 ? share * ratio / (1 - ratio) : std::numeric_limits<double>::infinity();
@@ -73,13 +77,13 @@ OrderSeries symmetric_series(const Series& series, const Fields& g, const Series
             result.ratio = result.remainder = 0;
             break;
         }
-        // c_{2M} / c_{2M-1} is the last ratio, unless light bounces between two walls (K has eigenvalues +x
-        // and -x and odd orders nearly vanish): then what the norm loses in two orders tells. After one
-        // application that still falls too fast.
-        const double by_norm = std::sqrt(even / last_even),
-                     at_most = (result.applications == 1 ? 2.0 : 1.25) * by_norm;
+        // From the norms. The products c_{2M} / c_{2M-1} would tell more, but mislead where light bounces
+        // between two walls (K has eigenvalues +x and -x, and odd orders nearly vanish). After one
+        // application the norm still falls too fast, and they are needed.
+        const double by_norm = std::sqrt(even / last_even);
         const double odd = sampled_inner_product(*order(result.applications - 1), carried.back());
-        result.ratio = std::min(even < at_most * odd ? even / odd : by_norm, 0.999999);
+        const bool first = result.applications == 1 && odd > 0;
+        result.ratio = std::min(first ? std::min(even / odd, 2 * by_norm) : by_norm, largest_ratio);
         last_even = even;
         result.remainder = continuation(weight * weight * even / start, albedo * result.ratio);
         if (enough(result, options)) break;
@@ -137,7 +141,7 @@ OrderSeries one_sided_series(const Series& series, const Fields& lights, const F
             result.ratio = result.remainder = 0;
             break;
         }
-        result.ratio = std::min(std::sqrt(next_norm / norm), 0.999999);
+        result.ratio = std::min(std::sqrt(next_norm / norm), largest_ratio);
         result.remainder = continuation(weight * std::sqrt(next_norm / start), albedo * result.ratio);
         norm = next_norm;
         if (enough(result, options)) break;

@@ -35,7 +35,7 @@ struct OrderSeries {
 
 // Relative error to expect of the geometric continuation, as a share of the continuation itself: decides when
 // to stop, and goes into the bias.
-inline constexpr double series_continuation_error = 0.2;
+inline constexpr double series_continuation_error = 0.5;
 
 // factors: sqrt(albedo) per slot of one channel of a map, or null. The irradiance must then carry it already.
 OrderSeries diffuse_series(const LinkOperator& op, const Tile& tile, const Fields& lights,
