@@ -270,7 +270,10 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
     const Estimate without = make_estimate(context_, groups_, stages, {}, skipped_bound_);
     const double guess =
         safe_sqrt(with.systematic * with.systematic - without.systematic * without.systematic);
-    if (options_.allow_skips && 3 * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
+    // The guess was calibrated on resolved reliefs; tiny grids are not, and cost nothing to measure.
+    const bool tiny = scene_.surface.nx * static_cast<long long>(scene_.surface.ny) < 1024;
+    if (options_.allow_skips && !tiny &&
+        3 * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
         if (stages.size() == 1)
             result_.report.skipped.push_back(
                 {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});
@@ -305,9 +308,12 @@ void Measurement::measure() {
         stages[0].settings = {samples->sub_samples, samples->directions, samples->refinement, 0, 0};
         if (!run_fits(context_, stages[0].settings))
             std::tie(stages[0].settings.tiles_x, stages[0].settings.tiles_y) = covering_windows(context_);
-        // Fewer directions would let single rays carry more light than there is.
-        stages[0].settings.directions =
-            std::max(samples->directions, 16 * samples->refinement * samples->refinement);
+        // Fewer would let single rays carry more light than there is.
+        const int least = 16 * samples->refinement * samples->refinement;
+        if (samples->directions < least && context_.indirect)
+            throw Error(ErrorCode::invalid_input, "/accuracy/samples/directions",
+                        std::to_string(samples->directions),
+                        "needs at least 16 refinement^2 = " + std::to_string(least));
     } else {
         stages[0].settings = first_settings(context_, wanted > 0 ? wanted : default_target);
     }

@@ -17,10 +17,9 @@ struct Accuracy {
     std::optional<double> max_seconds;  // may also stand beside a target: whichever comes first
     struct Samples {
         int sub_samples = 1;  // points per facet and replicate for the direct term, >= 1
-        int directions =
-            64;  // shared directions of the indirect term per replicate; at least 16 refinement^2 are used
-        int refinement = 1;  // each facet split into refinement^2 parts of constant radiosity: 1, 2 or 4
-        int replicates = 8;  // independent randomisations, >= 2
+        int directions = 64;  // shared directions of the indirect term per replicate; >= 16 refinement^2
+        int refinement = 1;   // each facet split into refinement^2 parts of constant radiosity: 1, 2 or 4
+        int replicates = 8;   // independent randomisations, >= 2
     };
     std::optional<Samples> samples;  // explicit settings
     uint64_t seed = 1;
