@@ -155,7 +155,7 @@ class Measurement {
         } else {
             skipped_bound_ = 0;
         }
-        context_.series_tolerance = std::clamp(0.15 * target(), 1e-6, 2e-3);
+        context_.series_tolerance = std::clamp(0.02 * target(), 1e-6, 2e-3);
         if (context_.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
     }
 
@@ -270,9 +270,7 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
     const Estimate without = make_estimate(context_, groups_, stages, {}, skipped_bound_);
     const double guess =
         safe_sqrt(with.systematic * with.systematic - without.systematic * without.systematic);
-    // The guess was calibrated on resolved reliefs; tiny grids are not, and cost nothing to measure.
-    const bool tiny = scene_.surface.nx * static_cast<long long>(scene_.surface.ny) < 1024;
-    if (options_.allow_skips && !tiny &&
+    if (options_.allow_skips && mesh_bias_is_predictable(context_) &&
         3 * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
         if (stages.size() == 1)
             result_.report.skipped.push_back(
@@ -376,25 +374,26 @@ void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& 
     report.relative_error = e.total;
     report.target_met = wanted == 0 || e.total <= wanted;
     const std::string side = std::to_string(tile_core);
-    report.settings = {{"transport", "diffuse operator"},
-                       {"simd", simd_target()},
-                       {"sub_samples", std::to_string(last.sub_samples)},
-                       {"directions", std::to_string(last.directions)},
-                       {"refinement", std::to_string(last.refinement)},
-                       {"windows", last.tiles_x == 0 ? "whole period"
-                                                     : std::to_string(last.tiles_x * last.tiles_y) +
-                                                           " a run of " + side + " x " + side + " cells"},
-                       {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) +
-                                    " in " + std::to_string(stages.size()) + " stages)"},
-                       {"mesh_bias", mesh_bias_.measured ? "two grids: indirect part corrected by " +
-                                                               number(100 * mesh_bias_.correction) + " %"
-                                                         : "guessed from the relief"},
-                       {"noise_bias", "corrected by " +
-                                          number(stages.back().noise ? -100 * stages.back().noise->kappa *
-                                                                           std::pow(albedo_range().second, 2)
-                                                                     : 0) +
-                                          " % of the direct part"},
-                       {"relative_error", number(e.total)}};
+    report.settings = {
+        {"transport", "diffuse operator"},
+        {"simd", simd_target()},
+        {"sub_samples", std::to_string(last.sub_samples)},
+        {"directions", std::to_string(last.directions)},
+        {"refinement", std::to_string(last.refinement)},
+        {"windows", last.tiles_x == 0 ? "whole period"
+                                      : std::to_string(last.tiles_x * last.tiles_y) + " a run of " + side +
+                                            " x " + side + " cells"},
+        {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) + " in " +
+                     std::to_string(stages.size()) + " stages)"},
+        {"mesh_bias", mesh_bias_.measured() ? "two grids: second order corrected by " +
+                                                  number(100 * mesh_bias_.share_of_order(2).correction) + " %"
+                                            : "guessed from the relief"},
+        {"noise_bias", "corrected by " +
+                           number(stages.back().noise
+                                      ? -100 * stages.back().noise->kappa * std::pow(albedo_range().second, 2)
+                                      : 0) +
+                           " % of the direct part"},
+        {"relative_error", number(e.total)}};
     report.counters = {
         {"rays", totals_.rays},
         {"rays skipped (steeper than the relief)", totals_.rays_skipped},

@@ -2,10 +2,153 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "surface/facet_mesh.h"
 
 namespace gonio {
+namespace {
+
+// Error falls with the square of the part's size: half the size leaves a quarter, so the whole error is 4/3
+// of the difference.
+constexpr double whole = 4.0 / 3;
+
+// Where the pairs of the table stand in a matrix of lights x views (or x lights, if they are the views).
+std::vector<size_t> asked_entries(const RunContext& context, int n_columns) {
+    std::vector<size_t> entries;
+    const size_t n_views = context.views.size();
+    for (size_t row = 0; row < context.rows(); ++row) {
+        const auto [light, view] = context.plan->pairs.empty() ? std::pair{static_cast<int>(row / n_views),
+                                                                           static_cast<int>(row % n_views)}
+                                                               : context.plan->pairs[row];
+        const int column = context.view_to_light.empty() ? view : context.view_to_light[view];
+        entries.push_back(static_cast<size_t>(light) * n_columns + column);
+    }
+    return entries;
+}
+
+std::vector<size_t> every_entry(size_t n) {
+    std::vector<size_t> entries(n);
+    std::iota(entries.begin(), entries.end(), size_t{0});
+    return entries;
+}
+
+void add_scaled(const Matrix& from, double scale, Matrix& to) {
+    for (size_t k = 0; k < to.values.size(); ++k) to.values[k] += scale * from.values[k];
+}
+
+double sum_of(const Matrix& m, const std::vector<size_t>& entries) {
+    double sum = 0;
+    for (const size_t k : entries) sum += m.values[k];
+    return sum;
+}
+
+// K g and K' K g, with another sampling K' of the operator: K K from one would hold the mean square of its
+// noise (noise_bias.h), and the finer parts more of it.
+struct Chain {
+    Fields once, twice;
+};
+Chain make_chain(const LinkOperator& first, const LinkOperator& second, const Tile& tile, const Fields& from,
+                 int average_to, int n_threads) {
+    auto transported = [&](const LinkOperator& op, const Fields& x) {
+        Fields y(x.n_unknowns(), x.n_columns());
+        apply(op, x, y, n_threads);
+        if (average_to > 0) average_parts(tile, average_to, n_threads, y);
+        return y;
+    };
+    Chain chain;
+    chain.once = transported(first, from);
+    chain.twice = transported(second, chain.once);
+    return chain;
+}
+
+// Orders 2 to 5 of the light between facet parts, the samplings taking turns: <g, K1 g>, <g, K2 K1 g>, <g, K2
+// K1 K2 g> ...
+std::vector<Matrix> low_orders(const LinkOperator& k1, const LinkOperator& k2, const Tile& tile,
+                               const Fields& lights, const Fields& views, bool same, int average_to,
+                               int n_threads) {
+    const Chain light = make_chain(k1, k2, tile, lights, average_to, n_threads);
+    const Chain view = make_chain(k2, k1, tile, same ? lights : views, average_to, n_threads);
+    std::vector<Matrix> orders(4, Matrix(lights.n_columns(), views.n_columns()));
+    auto add = [&](int order, const Fields& a, const Fields& b, double scale) {
+        add_products(tile, {{&a, 1}}, {{&b, 1}}, scale, n_threads, orders[order - 2]);
+    };
+    add(2, light.once, views, 0.5);
+    add(2, lights, view.once, 0.5);
+    add(3, light.once, view.once, 1);
+    // <K2 K1 l, K1 v>: the same operator does not meet itself.
+    if (same) {
+        add(4, light.twice, light.once, 0.5);
+        add(4, view.once, view.twice, 0.5);
+    } else {
+        Fields k1_views(views.n_unknowns(), views.n_columns());
+        apply(k1, views, k1_views, n_threads);
+        if (average_to > 0) average_parts(tile, average_to, n_threads, k1_views);
+        add(4, light.twice, k1_views, 1);
+    }
+    add(5, light.twice, view.twice, 1);
+    return orders;
+}
+
+MeshShare compare_grids(const Matrix& exact, const Matrix& coarse, const std::vector<size_t>& asked,
+                        bool keep_pairs) {
+    const double n = static_cast<double>(asked.size()), total = sum_of(coarse, asked);
+    MeshShare share;
+    if (keep_pairs) share.pairs = Matrix(exact.rows, exact.columns);
+    if (!(total > 0)) return share;
+    const double mean = sum_of(exact, asked) / total - 1;
+    double spread = 0, differences = 0, totals = 0;
+    for (const size_t k : asked) {
+        const double difference = exact.values[k] - coarse.values[k],
+                     relative = difference / std::max(coarse.values[k], 0.05 * total / n);
+        spread += std::pow(relative - mean, 2) / n;
+        differences += difference * difference;
+        totals += coarse.values[k] * coarse.values[k];
+        if (keep_pairs) share.pairs.values[k] = whole * relative;
+    }
+    share.correction = whole * mean;
+    share.uncertainty = whole * (std::sqrt(spread) + 0.15 * std::abs(mean));
+    share.typical = whole * std::sqrt(differences / totals);
+    return share;
+}
+
+}  // namespace
+
+double MeshShare::uncertainty_of(int light, int view) const {
+    if (pairs.values.empty()) return uncertainty;
+    // Measured against runs of refinement 4 (slopes 0.7 and 1.5, correlation lengths 2 and 8) and on grooves
+    // whose walls are one facet: a quarter is left where the correction is large, up to half where small.
+    constexpr double left = 0.3;
+    return left * std::hypot(pairs(light, view), typical);
+}
+
+MeshShare MeshBias::share_of_sum(double albedo, int max_order) const {
+    if (!measured()) return {0, guess, {}, 0};
+    const size_t last = exact.size() - 1,
+                 n = max_order == 0 ? exact.size() : std::min<size_t>(exact.size(), max_order - 1);
+    Matrix fine(exact[0].rows, exact[0].columns), rough = fine;
+    double power = 1;
+    for (size_t k = 0; k < n; ++k, power *= albedo) {
+        add_scaled(exact[k], power, fine);
+        add_scaled(coarse[k], power, rough);
+    }
+    const double x = std::min(0.9, albedo * ratio);
+    if (max_order == 0 && x > 0) {
+        // The orders beyond go on as the last two here, which may take turns between two walls.
+        const double tail = power / albedo * x / (1 - x) / 2;
+        for (const auto& [from, to] : {std::pair{&exact, &fine}, std::pair{&coarse, &rough}}) {
+            add_scaled((*from)[last], tail, *to);
+            add_scaled((*from)[last - 1], tail * ratio, *to);
+        }
+    }
+    return compare_grids(fine, rough, asked, all_pairs);
+}
+
+MeshShare MeshBias::share_of_order(int order) const {
+    if (!measured()) return {0, guess, {}, 0};
+    const size_t k = std::min<size_t>(order - 2, exact.size() - 1);
+    return compare_grids(exact[k], coarse[k], asked, all_pairs);
+}
 
 MeshBias predict_mesh_bias(const HeightField& surface) {
     // rms change of the gradient from one cell to the next, over the rms gradient; from a sample of rows.
@@ -21,55 +164,62 @@ MeshBias predict_mesh_bias(const HeightField& surface) {
             total += g.x * g.x + g.y * g.y;
         }
     const double roughness = total > 0 ? std::sqrt(change / total) : 0;
-    return {0, 0.007 * std::pow(roughness, 1.5), false};
+    MeshBias bias;
+    bias.guess = 0.018 * roughness * roughness;
+    return bias;
+}
+
+bool mesh_bias_is_predictable(const RunContext& context) {
+    const HeightField& s = *context.surface;
+    return s.nx * static_cast<long long>(s.ny) >= 1024 && context.grid->max_slope < 8;
 }
 
 MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, int n_threads,
                            const Monitor& monitor) {
-    const std::vector<Vec3> chosen = probe_directions(context);
-    const size_t n = chosen.size();
-
-    // Many directions: with few the probe would see its own noise (at 128, spread 3.1e-4 instead of 1.4e-4).
-    const int refinement = 2 * settings.refinement, n_directions = std::max(1024, settings.directions);
-    const Tile tile = probe_tile(context, settings, refinement);
-    const double z_max =
-        context.grid->max_slope / std::sqrt(1 + context.grid->max_slope * context.grid->max_slope);
-    const DirectionSet set = slab_directions(n_directions, z_max, 0.5, 0.25);
-    const Irradiance irradiance = compute_irradiance(*context.grid, tile, chosen, chosen, true, {{0.6, 0.3}},
-                                                     {}, context.skip_steep, n_threads, monitor);
-    const LinkOperator op = build_link_operator(
-        *context.grid, tile, set, shifted_sub_samples(n_directions, 0.5, 0.5), n_threads, monitor);
-    // The second order alone: it is linear in K. Higher ones would compare how noisy the two operators are
-    // (noise_bias.h).
-    auto second_order = [&](const Fields& g) {
-        Fields once(g.n_unknowns(), g.n_columns());
-        apply(op, g, once, n_threads);
-        Matrix sum(static_cast<int>(n), static_cast<int>(n));
-        add_products(tile, {{&g, 1}}, {{&once, 1}}, 1.0, n_threads, sum);
-        return sum;
+    constexpr size_t most_directions = 64;
+    const Tile tile = probe_tile(context, settings, 2 * settings.refinement);
+    // Irradiance and both chains on both grids, never more than eight fields at once.
+    auto fits = [&](size_t directions) {
+        const double columns =
+            static_cast<double>((directions + column_block - 1) / column_block * column_block);
+        return 8 * 4.0 * columns * static_cast<double>(tile.n_unknowns()) <
+               static_cast<double>(context.max_bytes);
     };
-    Fields averaged = irradiance.lights;
-    average_parts(tile, settings.refinement, n_threads, averaged);
-    const Matrix exact = second_order(irradiance.lights), coarse = second_order(averaged);
-
-    double difference = 0, total = 0, spread = 0;
-    for (size_t k = 0; k < exact.values.size(); ++k) {
-        difference += exact.values[k] - coarse.values[k];
-        total += coarse.values[k];
-    }
+    if (!fits(1)) return predict_mesh_bias(*context.surface);
+    const bool same = !context.view_to_light.empty();
+    const size_t directions = context.lights.size() + (same ? 0 : context.views.size());
     MeshBias bias;
-    bias.measured = true;
-    if (!(total > 0)) return bias;
-    const double mean = difference / total, mean_value = total / static_cast<double>(exact.values.size());
-    for (size_t k = 0; k < exact.values.size(); ++k) {
-        const double relative = (exact.values[k] - coarse.values[k] - mean * coarse.values[k]) /
-                                std::max(coarse.values[k], 0.05 * mean_value);
-        spread += relative * relative / static_cast<double>(exact.values.size());
-    }
-    // Error falls with the square of the part's size: half the size leaves a quarter, so the whole error is
-    // 4/3 of the difference.
-    bias.correction = 4.0 / 3 * mean;
-    bias.uncertainty = 4.0 / 3 * std::sqrt(spread) + 0.15 * std::abs(bias.correction);
+    bias.all_pairs = directions <= most_directions && fits(directions);
+    const bool two_sided = bias.all_pairs && !same;
+    const std::vector<Vec3> probes = bias.all_pairs ? context.lights : probe_directions(context);
+
+    // Many directions: with few the probe would see its own noise (at 128, spread 3.1e-4 instead of 1.4e-4 on
+    // 64 x 64 cells), and the more so the fewer facets there are to average over.
+    const double cells = static_cast<double>(context.surface->nx) * context.surface->ny;
+    const int n_directions =
+                  std::max(settings.directions, static_cast<int>(std::clamp(1e6 / cells, 1024.0, 8192.0))),
+              n_places = static_cast<int>(std::clamp(65536 / cells, 1.0, 16.0));
+    const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
+    const Irradiance irradiance = compute_irradiance(
+        *context.grid, tile, probes, two_sided ? context.views : probes, !two_sided,
+        shifted_sub_samples(n_places, 0.6, 0.3), {}, context.skip_steep, n_threads, monitor);
+    auto half_of_the_directions = [&](double shift) {
+        return build_link_operator(*context.grid, tile,
+                                   slab_directions(n_directions / 2, z_max, 0.5, 0.25 + shift),
+                                   shifted_sub_samples(n_directions / 2, 0.5, shift), n_threads, monitor);
+    };
+    const LinkOperator k1 = half_of_the_directions(0), k2 = half_of_the_directions(0.5);
+    bias.exact =
+        low_orders(k1, k2, tile, irradiance.lights, irradiance.view_fields(), !two_sided, 0, n_threads);
+    Fields lights = irradiance.lights, views = irradiance.views;
+    average_parts(tile, settings.refinement, n_threads, lights);
+    if (two_sided) average_parts(tile, settings.refinement, n_threads, views);
+    bias.coarse = low_orders(k1, k2, tile, lights, two_sided ? views : lights, !two_sided,
+                             settings.refinement, n_threads);
+    bias.asked = bias.all_pairs ? asked_entries(context, bias.exact[0].columns)
+                                : every_entry(bias.exact[0].values.size());
+    const double third = sum_of(bias.coarse[1], bias.asked);
+    bias.ratio = third > 0 ? std::sqrt(sum_of(bias.coarse[3], bias.asked) / third) : 0.0;
     return bias;
 }
 

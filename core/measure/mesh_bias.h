@@ -5,20 +5,45 @@
 
 namespace gonio {
 
-// Of the indirect part of f, relative. true = computed * (1 + correction), with `uncertainty` left (one sigma
-// over the table's pairs and of the extrapolation).
+// Relative: true = computed * (1 + correction), with `uncertainty` left (one sigma). Of each pair (lights x
+// views, or x lights if those are the views) where `pairs` is filled, else one for all of them.
+struct MeshShare {
+    double correction = 0, uncertainty = 0;  // of all pairs
+    Matrix pairs;
+    double typical = 0;  // rms of `pairs` over the table, weighted by value
+
+    double correction_of(int light, int view) const {
+        return pairs.values.empty() ? correction : pairs(light, view);
+    }
+    double uncertainty_of(int light, int view) const;
+};
+
+// What two grids gave for the orders of scattering 2, 3, ... at albedo 1; nothing, where the bias was only
+// guessed.
 struct MeshBias {
-    double correction = 0, uncertainty = 0;
-    bool measured = false;
+    std::vector<Matrix> exact, coarse;  // lights x views; or a few directions with themselves
+    std::vector<size_t> asked;          // entries of those that stand for pairs of the table
+    bool all_pairs = false;             // they are the table's lights and views
+    double guess = 0;                   // uncertainty without two grids
+    double ratio = 0;                   // of one order to the one before, at albedo 1
+
+    bool measured() const { return !exact.empty(); }
+    // Of the indirect part of the sum of orders 2 .. max_order (0: all) at an albedo.
+    MeshShare share_of_sum(double albedo, int max_order) const;
+    MeshShare share_of_order(int order) const;  // order >= 2
 };
 
 // Guess from how much neighbouring facets differ in tilt, calibrated on two-grid runs of Gaussian fields: 0.1
 // % (correlation length 8 cells) to 0.8 % (2 cells) of the indirect part. No run.
 MeshBias predict_mesh_bias(const HeightField& surface);
 
+// Whether the relief is such as the guess was calibrated on: not if it has few facets, or facets much taller
+// than wide, which light crosses in bands.
+bool mesh_bias_is_predictable(const RunContext& context);
+
 // One run on parts twice as fine, and on the same rays with the irradiance averaged back to
-// `settings.refinement`: their difference has no noise of its own, falls with the square of the part's size,
-// and so corrects the coarse result (Richardson).
+// `settings.refinement` after every order: their difference falls with the square of the part's size, and so
+// corrects the coarse result (Richardson). Pair by pair where the lights and views are few.
 MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, int n_threads,
                            const Monitor& monitor);
 

@@ -17,21 +17,25 @@ NoiseBias noise_bias(const Tile& tile, const std::vector<const Fields*>& first, 
     }
     const Combination g{{&irradiance, 1}};
     add_products(tile, g, g, 1.0, n_threads, start);
-    double total_noise = 0, total = 0, spread = 0;
+    // A direction with itself stands out, and is no pair of the table unless lights are views.
+    std::vector<std::pair<int, int>> entries;
     for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j) {
-            total_noise += noise(i, j);
-            total += start(i, j);
-        }
+        for (int j = 0; j < n; ++j)
+            if (i != j || keep_pairs || n == 1) entries.emplace_back(i, j);
+    const double n_entries = static_cast<double>(entries.size());
+    double total_noise = 0, total = 0, spread = 0;
+    for (const auto& [i, j] : entries) {
+        total_noise += noise(i, j);
+        total += start(i, j);
+    }
     if (!(total > 0 && total_noise > 0)) return {};
     NoiseBias bias;
     bias.kappa = total_noise / total;
-    const double mean = total / (static_cast<double>(n) * n);
-    for (int i = 0; i < n; ++i)
-        for (int j = 0; j < n; ++j)
-            spread +=
-                std::pow((noise(i, j) / bias.kappa - start(i, j)) / std::max(start(i, j), 0.05 * mean), 2) /
-                (static_cast<double>(n) * n);
+    for (const auto& [i, j] : entries)
+        spread += std::pow((noise(i, j) / bias.kappa - start(i, j)) /
+                               std::max(start(i, j), 0.05 * total / n_entries),
+                           2) /
+                  n_entries;
     bias.doubt = std::sqrt(spread);
     bias.core_area = tile.core_area();
     if (keep_pairs) bias.pairs = std::move(noise);

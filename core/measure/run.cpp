@@ -257,10 +257,13 @@ std::vector<Vec3> probe_directions(const RunContext& context) {
 
 Tile probe_tile(const RunContext& context, const RunSettings& settings, int refinement) {
     const HeightField& s = *context.surface;
-    const int width = std::min(s.nx, tile_core), height = std::min(s.ny, tile_core);
-    const bool whole = settings.tiles_x == 0 && width == s.nx && height == s.ny;
-    const int halo_x = whole ? 0 : std::min(tile_halo, (s.nx - width) / 2),
-              halo_y = whole ? 0 : std::min(tile_halo, (s.ny - height) / 2);
+    // A long and narrow surface is small, too, and a part of it may miss what matters (one wall of a groove).
+    const bool whole =
+        settings.tiles_x == 0 && static_cast<double>(s.nx) * s.ny <= std::pow(tile_core + 2.0 * tile_halo, 2);
+    if (whole) return make_tile(s, {0, 0, s.nx, s.ny}, {0, 0, s.nx, s.ny}, refinement);
+    const int width = std::min(s.nx, tile_core), height = std::min(s.ny, tile_core),
+              halo_x = std::min(tile_halo, (s.nx - width) / 2),
+              halo_y = std::min(tile_halo, (s.ny - height) / 2);
     const CellRect area{wrap_index((s.nx - width) / 2 - halo_x, s.nx),
                         wrap_index((s.ny - height) / 2 - halo_y, s.ny), width + 2 * halo_x,
                         height + 2 * halo_y};

@@ -1,0 +1,168 @@
+// Honest errors: the true error lies within 1, 2 and 3 times sqrt(se^2 + bias^2) as often as a normal deviate
+// would, within 5 points, over thousands of table entries. Truth: closed forms and the reference answers of
+// ../validation for V-grooves, which their grids are exactly, and data/honest_*.json
+// (make_honest_references.cpp) for Gaussian fields.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "agreement/honest_surfaces.h"
+#include "agreement/measured.h"
+#include "validation/closed_forms.h"
+#include "validation/reference_data.h"
+
+namespace gonio {
+namespace {
+
+constexpr int n_seeds = 12;
+
+// Counts entries whose error is within k stated errors; the parts are shown when a bar is missed, for too
+// wide and too narrow have different cures.
+struct Coverage {
+    long long entries = 0;
+    std::array<long long, 3> within{};
+    double error = 0, se = 0, bias = 0;  // sums of squares, relative to the true value
+
+    void add(double truth, double f, double se_of_f, double bias_of_f) {
+        const double off = std::abs(f - truth), sigma = std::hypot(se_of_f, bias_of_f);
+        // No facet lights another, or the grid resolves all: exact but for rounding to float.
+        if (off <= 2e-6 * std::max(1.0, truth)) return;
+        ++entries;
+        for (int k = 0; k < 3; ++k) within[k] += off <= (k + 1) * sigma;
+        error += std::pow(off / truth, 2);
+        se += std::pow(se_of_f / truth, 2);
+        bias += std::pow(bias_of_f / truth, 2);
+    }
+    void add(const Coverage& other) {
+        entries += other.entries;
+        for (int k = 0; k < 3; ++k) within[k] += other.within[k];
+        error += other.error;
+        se += other.se;
+        bias += other.bias;
+    }
+    double percent(int k) const {
+        return 100.0 * static_cast<double>(within[k]) / static_cast<double>(entries);
+    }
+    double rms(double sum) const { return std::sqrt(sum / static_cast<double>(entries)); }
+    std::string text() const {
+        char line[160];
+        std::snprintf(
+            line, sizeof line,
+            "%6lld entries: %5.1f %5.1f %5.1f %% within 1, 2, 3 sigma; rms error %.1e, se %.1e, bias %.1e",
+            entries, percent(0), percent(1), percent(2), rms(error), rms(se), rms(bias));
+        return line;
+    }
+};
+
+Coverage gaussian_field(const honest::GaussianSurface& field, double target) {
+    const HeightField surface = field.make();
+    const nlohmann::json truth =
+        reference::load_json(std::string("../../agreement/data/honest_") + field.name);
+    EXPECT_EQ(truth.at("surface_hash"), surface_hash(surface));
+    const std::vector<double> values = truth.at("f");
+    Coverage coverage;
+    for (int seed = 1; seed <= n_seeds; ++seed) {
+        BrdfPlan plan = honest::plan();
+        plan.accuracy.target_relative_error = target;
+        plan.accuracy.seed = seed;
+        const Table table = measure(surface, honest::material(), plan).table;
+        for (size_t k = 0; k < values.size(); ++k)
+            coverage.add(values[k], table.f[k], table.se[k], table.bias[k]);
+    }
+    // A truth that is to judge must be much better than what it judges.
+    EXPECT_LT(5 * std::hypot(truth.at("rms_relative_se").get<double>(),
+                             truth.at("rms_relative_bias").get<double>()),
+              coverage.rms(coverage.error))
+        << field.name;
+    return coverage;
+}
+
+// All orders, every albedo of the reference answers.
+Coverage v_groove(const std::string& name, double target) {
+    const reference::Case expected = reference::load_case(name);
+    const HeightField surface = reference::surface(expected, 64);
+    Coverage coverage;
+    for (int seed = 1; seed <= n_seeds; ++seed) {
+        BrdfPlan plan = expected.plan();
+        plan.accuracy.target_relative_error = target;
+        plan.accuracy.seed = seed;
+        const Table table = measure(surface, expected.material(false), plan).table;
+        size_t channel = 0;
+        for (const reference::Quantity& quantity : expected.quantities) {
+            if (quantity.order != 0) continue;
+            for (size_t row = 0; row < table.rows(); ++row) {
+                const size_t k = table.index(channel, 0, row);
+                coverage.add(quantity.values[row], table.f[k], table.se[k], table.bias[k]);
+            }
+            ++channel;
+        }
+    }
+    return coverage;
+}
+
+// Direct light, by its closed form.
+Coverage v_groove_direct(double alpha_deg, double target) {
+    const HeightField surface = generate_v_groove(64, 2, alpha_deg);
+    const double slope = std::tan(radians(alpha_deg));
+    Coverage coverage;
+    for (int seed = 1; seed <= n_seeds; ++seed) {
+        BrdfPlan plan = honest::plan();
+        plan.max_order = 1;
+        plan.accuracy.target_relative_error = target;
+        plan.accuracy.seed = seed;
+        const Table table = measure(surface, honest::material(), plan).table;
+        for (size_t k = 0; k < table.f.size(); ++k) {
+            const auto [i, o] = table.pair(k);
+            coverage.add(
+                reference::v_groove_direct(slope, honest::albedo, plan.incident[i], plan.outgoing[o]),
+                table.f[k], table.se[k], table.bias[k]);
+        }
+    }
+    return coverage;
+}
+
+class HonestErrors : public testing::TestWithParam<double> {};
+
+TEST_P(HonestErrors, CoverTheTruthAsOftenAsTheyShould) {
+    const double target = GetParam();
+    Coverage all;
+    std::string parts;
+    const auto count = [&](const std::string& name, const Coverage& coverage) {
+        all.add(coverage);
+        parts += "\n  " + name + ": " + coverage.text();
+    };
+    for (const honest::GaussianSurface& field : honest::gaussian_surfaces)
+        count(field.name, gaussian_field(field, target));
+    for (const char* name : {"vgroove_a20", "vgroove_a45", "vgroove_a70"})
+        count(name, v_groove(name, target));
+    for (const double alpha_deg : {33.0, 60.0})
+        count("direct light of a groove", v_groove_direct(alpha_deg, target));
+    EXPECT_GT(all.entries, 5000);
+    const double normal[] = {68.3, 95.4, 99.7};
+    for (int k = 0; k < 3; ++k)
+        EXPECT_NEAR(all.percent(k), normal[k], 5)
+            << "within " << k + 1 << " sigma, target " << target << parts;
+    RecordProperty("coverage", all.text() + parts);
+    std::printf("target %g: %s%s\n", target, all.text().c_str(), parts.c_str());
+}
+
+INSTANTIATE_TEST_SUITE_P(Targets, HonestErrors, testing::Values(0.01, 0.002));
+
+// The truth itself, judged by the path tracer when it was made: no more than its own noise apart, and no
+// shift of the whole table.
+TEST(HonestTruth, AgreesWithThePathTracer) {
+    for (const honest::GaussianSurface& field : honest::gaussian_surfaces) {
+        const nlohmann::json truth =
+            reference::load_json(std::string("../../agreement/data/honest_") + field.name);
+        const nlohmann::json& traced = truth.at("path_tracer");
+        EXPECT_LT(traced.at("rms_relative_se"), 0.003) << field.name;
+        EXPECT_LT(traced.at("rms_pull"), 1.3) << field.name;
+        EXPECT_LT(std::abs(traced.at("mean_relative_difference").get<double>()),
+                  3 * traced.at("se_of_mean").get<double>())
+            << field.name;
+    }
+}
+
+}  // namespace
+}  // namespace gonio
