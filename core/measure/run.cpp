@@ -29,21 +29,26 @@ std::vector<Tile> make_tiles(const RunContext& context, const RunSettings& setti
         tiles.push_back(whole_tile(context, settings));
         return tiles;
     }
-    // A randomly shifted lattice of windows: with as many as fit it covers the surface once. Of an open
-    // surface, its inner rectangle.
+    // A randomly shifted lattice of windows: with as many as fit it covers the surface once. The inner
+    // rectangle of an open surface does not wrap, and windows anywhere inside it would see its middle more
+    // often than its rim: there the lattice picks cells of a fixed partition.
     const int inner_x = s.nx - 2 * s.border_x, inner_y = s.ny - 2 * s.border_y;
-    const int core_x = std::min(tile_core, inner_x), core_y = std::min(tile_core, inner_y);
     const bool open = s.border_x > 0 || s.border_y > 0;
+    struct Span {
+        int start, length;
+    };
+    auto span = [&](int i, int n, double shift, int inner, int border) {
+        const double place = (i + shift) / n;
+        if (!open) return Span{static_cast<int>(place * inner), std::min(tile_core, inner)};
+        const int cells = (inner + tile_core - 1) / tile_core, cell = static_cast<int>(place * cells);
+        const int begin = inner * cell / cells;
+        return Span{border + begin, inner * (cell + 1) / cells - begin};
+    };
     std::vector<Tile> tiles;
     for (int b = 0; b < settings.tiles_y; ++b)
         for (int a = 0; a < settings.tiles_x; ++a) {
-            auto start = [&](int i, int n, double shift, int inner, int core, int border) {
-                const double place = (i + shift) / n;
-                return open ? border + static_cast<int>(place * (inner - core + 1))
-                            : static_cast<int>(place * inner);
-            };
-            const int x = start(a, settings.tiles_x, shifts(0), inner_x, core_x, s.border_x),
-                      y = start(b, settings.tiles_y, shifts(1), inner_y, core_y, s.border_y);
+            const auto [x, core_x] = span(a, settings.tiles_x, shifts(0), inner_x, s.border_x);
+            const auto [y, core_y] = span(b, settings.tiles_y, shifts(1), inner_y, s.border_y);
             const int halo_x = std::min(tile_halo, (s.nx - core_x) / 2),
                       halo_y = std::min(tile_halo, (s.ny - core_y) / 2);
             const CellRect area{wrap_index(x - halo_x, s.nx), wrap_index(y - halo_y, s.ny),
