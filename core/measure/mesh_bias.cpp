@@ -43,50 +43,47 @@ double sum_of(const Matrix& m, const std::vector<size_t>& entries) {
     return sum;
 }
 
-// K g and K' K g, with another sampling K' of the operator: K K from one would hold the mean square of its
-// noise (noise_bias.h), and the finer parts more of it.
-struct Chain {
-    Fields once, twice;
+// g carried on by two samplings of the operator that take turns: K K from one sampling would hold the mean
+// square of its noise (noise_bias.h), and the finer parts more of it.
+struct Carried {
+    Fields k1, k2k1, k2, k1k2;
 };
-Chain make_chain(const LinkOperator& first, const LinkOperator& second, const Tile& tile, const Fields& from,
-                 int average_to, int n_threads) {
+Carried carry(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile, const Fields& g,
+              int average_to, int n_threads) {
     auto transported = [&](const LinkOperator& op, const Fields& x) {
         Fields y(x.n_unknowns(), x.n_columns());
         apply(op, x, y, n_threads);
         if (average_to > 0) average_parts(tile, average_to, n_threads, y);
         return y;
     };
-    Chain chain;
-    chain.once = transported(first, from);
-    chain.twice = transported(second, chain.once);
-    return chain;
+    Carried carried;
+    carried.k1 = transported(op1, g);
+    carried.k2k1 = transported(op2, carried.k1);
+    carried.k2 = transported(op2, g);
+    carried.k1k2 = transported(op1, carried.k2);
+    return carried;
 }
 
-// Orders 2 to 5 of the light between facet parts, the samplings taking turns: <g, K1 g>, <g, K2 K1 g>, <g, K2
-// K1 K2 g> ...
-std::vector<Matrix> low_orders(const LinkOperator& k1, const LinkOperator& k2, const Tile& tile,
+// Orders 2 to 5 of the light between facet parts: K, K1 K2, K1 K2 K1, K1 K2 K1 K2, each with the samplings
+// exchanged as well, so that lights and views may be.
+std::vector<Matrix> low_orders(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile,
                                const Fields& lights, const Fields& views, bool same, int average_to,
                                int n_threads) {
-    const Chain light = make_chain(k1, k2, tile, lights, average_to, n_threads);
-    const Chain view = make_chain(k2, k1, tile, same ? lights : views, average_to, n_threads);
+    const Carried light = carry(op1, op2, tile, lights, average_to, n_threads),
+                  other = same ? Carried{} : carry(op1, op2, tile, views, average_to, n_threads);
+    const Carried& view = same ? light : other;
     std::vector<Matrix> orders(4, Matrix(lights.n_columns(), views.n_columns()));
-    auto add = [&](int order, const Fields& a, const Fields& b, double scale) {
-        add_products(tile, {{&a, 1}}, {{&b, 1}}, scale, n_threads, orders[order - 2]);
+    auto add = [&](int order, const Fields& a, const Fields& b) {
+        add_products(tile, {{&a, 1}}, {{&b, 1}}, 0.5, n_threads, orders[order - 2]);
     };
-    add(2, light.once, views, 0.5);
-    add(2, lights, view.once, 0.5);
-    add(3, light.once, view.once, 1);
-    // <K2 K1 l, K1 v>: the same operator does not meet itself.
-    if (same) {
-        add(4, light.twice, light.once, 0.5);
-        add(4, view.once, view.twice, 0.5);
-    } else {
-        Fields k1_views(views.n_unknowns(), views.n_columns());
-        apply(k1, views, k1_views, n_threads);
-        if (average_to > 0) average_parts(tile, average_to, n_threads, k1_views);
-        add(4, light.twice, k1_views, 1);
-    }
-    add(5, light.twice, view.twice, 1);
+    add(2, light.k1, views);
+    add(2, light.k2, views);
+    add(3, light.k1, view.k2);
+    add(3, light.k2, view.k1);
+    add(4, light.k2k1, view.k1);
+    add(4, light.k1k2, view.k2);
+    add(5, light.k2k1, view.k1k2);
+    add(5, light.k1k2, view.k2k1);
     return orders;
 }
 

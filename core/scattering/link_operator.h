@@ -12,9 +12,9 @@
 namespace gonio {
 
 // K of the irradiance equation E = E_direct + albedo K E on facet parts of constant irradiance, in the basis
-// scaled by sqrt(area), where exact transport is self-adjoint: (K + K^T) / 2 of the sampled one is used, so
-// tables are reciprocal and energy is conserved to rounding whatever the number of directions
-// (shared/performance E: "SYM").
+// scaled by sqrt(area), where exact transport is self-adjoint. The sampled one is, too: each line found
+// between two facets counts both ways, weighed by the balance heuristic (link_operator.cpp), so tables are
+// reciprocal to rounding whatever the number of directions.
 struct LinkOperator {
     struct Chunk {
         std::vector<LinkRecord> records;  // one more than there are: its end
