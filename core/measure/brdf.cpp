@@ -11,6 +11,7 @@
 #include "measure/estimate.h"
 #include "measure/planning.h"
 #include "measure/simplify.h"
+#include "measure/windows.h"
 #include "visibility/march.h"
 
 namespace gonio {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "measure/windows.h"
 #include "surface/facet_mesh.h"
 
 namespace gonio {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "measure/windows.h"
 #include "surface/facet_mesh.h"
 
 namespace gonio {

@@ -48,8 +48,6 @@ struct RunSettings {
     bool operator==(const RunSettings&) const = default;
 };
 
-inline constexpr int tile_core = 128, tile_halo = 32;  // cells
-
 struct RunValues {
     int higher_orders = 0;  // single orders kept beyond the first (0 when combined)
     int applications = 0;
@@ -77,14 +75,6 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
 
 // n places inside the facets: the R2 sequence (Roberts 2018) from a random start.
 std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b);
-
-// The whole period as one tile, its measured core without the border of an open surface.
-Tile whole_tile(const RunContext& context, const RunSettings& settings);
-
-// For side measurements that need not be done for every direction and everywhere: up to 16 of the lights and
-// views, and the whole period or, if the runs use windows or the surface is large, one window in its middle.
-std::vector<Vec3> probe_directions(const RunContext& context);
-Tile probe_tile(const RunContext& context, const RunSettings& settings, int refinement);
 
 // Working memory of one run that cannot be split further, bytes.
 double run_bytes(const RunContext& context, const RunSettings& settings, int n_lights, int n_views);
