@@ -278,7 +278,9 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
                 {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});
         return;
     }
-    mesh_bias_ = measure_mesh_bias(context_, stages.back().settings, options_.n_threads, monitor_);
+    const double albedo = scene_.material.is_map() ? 1.0 : albedo_range().second;
+    mesh_bias_ = measure_mesh_bias(context_, stages.back().settings, albedo * stages.back().ratio,
+                                   options_.n_threads, monitor_);
 }
 
 // Whether the step ends before max_seconds; a step that would not is made smaller if that helps.

@@ -47,9 +47,10 @@ double sum_of(const Matrix& m, const std::vector<size_t>& entries) {
 // g carried on by two samplings of the operator that take turns: K K from one sampling would hold the mean
 // square of its noise (noise_bias.h), and the finer parts more of it.
 struct Carried {
-    Fields k1, k2k1, k2, k1k2;
+    Fields k1, k2;      // once
+    Fields k2k1, k1k2;  // twice, if wanted
 };
-Carried carry(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile, const Fields& g,
+Carried carry(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile, const Fields& g, bool twice,
               int average_to, int n_threads) {
     auto transported = [&](const LinkOperator& op, const Fields& x) {
         Fields y(x.n_unknowns(), x.n_columns());
@@ -59,21 +60,24 @@ Carried carry(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile
     };
     Carried carried;
     carried.k1 = transported(op1, g);
-    carried.k2k1 = transported(op2, carried.k1);
     carried.k2 = transported(op2, g);
-    carried.k1k2 = transported(op1, carried.k2);
+    if (twice) {
+        carried.k2k1 = transported(op2, carried.k1);
+        carried.k1k2 = transported(op1, carried.k2);
+    }
     return carried;
 }
 
-// Orders 2 to 5 of the light between facet parts: K, K1 K2, K1 K2 K1, K1 K2 K1 K2, each with the samplings
-// exchanged as well, so that lights and views may be.
+// Orders 2 and 3, or 2 to 5, of the light between facet parts: K, K1 K2, K1 K2 K1, K1 K2 K1 K2, each with the
+// samplings exchanged as well, so that lights and views may be.
 std::vector<Matrix> low_orders(const LinkOperator& op1, const LinkOperator& op2, const Tile& tile,
-                               const Fields& lights, const Fields& views, bool same, int average_to,
-                               int n_threads) {
-    const Carried light = carry(op1, op2, tile, lights, average_to, n_threads),
-                  other = same ? Carried{} : carry(op1, op2, tile, views, average_to, n_threads);
+                               const Fields& lights, const Fields& views, bool same, int n_orders,
+                               int average_to, int n_threads) {
+    const bool twice = n_orders > 2;
+    const Carried light = carry(op1, op2, tile, lights, twice, average_to, n_threads),
+                  other = same ? Carried{} : carry(op1, op2, tile, views, twice, average_to, n_threads);
     const Carried& view = same ? light : other;
-    std::vector<Matrix> orders(4, Matrix(lights.n_columns(), views.n_columns()));
+    std::vector<Matrix> orders(n_orders, Matrix(lights.n_columns(), views.n_columns()));
     auto add = [&](int order, const Fields& a, const Fields& b) {
         add_products(tile, {{&a, 1}}, {{&b, 1}}, 0.5, n_threads, orders[order - 2]);
     };
@@ -81,6 +85,7 @@ std::vector<Matrix> low_orders(const LinkOperator& op1, const LinkOperator& op2,
     add(2, light.k2, views);
     add(3, light.k1, view.k2);
     add(3, light.k2, view.k1);
+    if (!twice) return orders;
     add(4, light.k2k1, view.k1);
     add(4, light.k1k2, view.k2);
     add(5, light.k2k1, view.k1k2);
@@ -172,8 +177,8 @@ bool mesh_bias_is_predictable(const RunContext& context) {
     return s.nx * static_cast<long long>(s.ny) >= 1024 && context.grid->max_slope < 8;
 }
 
-MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, int n_threads,
-                           const Monitor& monitor) {
+MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, double falling,
+                           int n_threads, const Monitor& monitor) {
     constexpr size_t most_directions = 64;
     const Tile tile = probe_tile(context, settings, 2 * settings.refinement);
     // Irradiance and both chains on both grids, never more than eight fields at once.
@@ -191,12 +196,14 @@ MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& setting
     const bool two_sided = bias.all_pairs && !same;
     const std::vector<Vec3> probes = bias.all_pairs ? context.lights : probe_directions(context);
 
-    // Many directions: with few the probe would see its own noise (at 128, spread 3.1e-4 instead of 1.4e-4 on
-    // 64 x 64 cells), and the more so the fewer facets there are to average over.
+    // Many directions: with few the probe would see its own noise (64 x 64 cells need 1024: at 128 the spread
+    // is 3.1e-4 instead of 1.4e-4), and the more so the fewer facets there are to average over.
+    const int n_orders = falling > 0.5 ? 4 : 2;
     const double cells = static_cast<double>(context.surface->nx) * context.surface->ny;
-    const int n_directions =
-                  std::max(settings.directions, static_cast<int>(std::clamp(1e6 / cells, 1024.0, 8192.0))),
-              n_places = static_cast<int>(std::clamp(65536 / cells, 1.0, 16.0));
+    const int n_parts = settings.refinement * settings.refinement,
+              n_directions = std::max(settings.directions,
+                                      static_cast<int>(n_parts * std::clamp(4e6 / cells, 256.0, 8192.0))),
+              n_places = static_cast<int>(std::clamp(16384 / cells, 1.0, 16.0));
     const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
     const Irradiance irradiance = compute_irradiance(
         *context.grid, tile, probes, two_sided ? context.views : probes, !two_sided,
@@ -207,17 +214,20 @@ MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& setting
                                    shifted_sub_samples(n_directions / 2, 0.5, shift), n_threads, monitor);
     };
     const LinkOperator k1 = half_of_the_directions(0), k2 = half_of_the_directions(0.5);
-    bias.exact =
-        low_orders(k1, k2, tile, irradiance.lights, irradiance.view_fields(), !two_sided, 0, n_threads);
+    bias.exact = low_orders(k1, k2, tile, irradiance.lights, irradiance.view_fields(), !two_sided, n_orders,
+                            0, n_threads);
     Fields lights = irradiance.lights, views = irradiance.views;
     average_parts(tile, settings.refinement, n_threads, lights);
     if (two_sided) average_parts(tile, settings.refinement, n_threads, views);
-    bias.coarse = low_orders(k1, k2, tile, lights, two_sided ? views : lights, !two_sided,
+    bias.coarse = low_orders(k1, k2, tile, lights, two_sided ? views : lights, !two_sided, n_orders,
                              settings.refinement, n_threads);
     bias.asked = bias.all_pairs ? asked_entries(context, bias.exact[0].columns)
                                 : every_entry(bias.exact[0].values.size());
-    const double third = sum_of(bias.coarse[1], bias.asked);
-    bias.ratio = third > 0 ? std::sqrt(sum_of(bias.coarse[3], bias.asked) / third) : 0.0;
+    // Over two orders where that is known: light between two walls takes turns.
+    const int apart = n_orders > 2 ? 2 : 1;
+    const double last = sum_of(bias.coarse[n_orders - 1], bias.asked),
+                 before = sum_of(bias.coarse[n_orders - 1 - apart], bias.asked);
+    bias.ratio = before > 0 ? std::pow(last / before, 1.0 / apart) : 0.0;
     return bias;
 }
 

@@ -18,8 +18,8 @@ struct MeshShare {
     double uncertainty_of(int light, int view) const;
 };
 
-// What two grids gave for the orders of scattering 2, 3, ... at albedo 1; nothing, where the bias was only
-// guessed.
+// What two grids gave for the orders of scattering 2 and 3, or 2 to 5, at albedo 1; nothing, where the bias
+// was only guessed.
 struct MeshBias {
     std::vector<Matrix> exact, coarse;  // lights x views; or a few directions with themselves
     std::vector<size_t> asked;          // entries of those that stand for pairs of the table
@@ -43,8 +43,9 @@ bool mesh_bias_is_predictable(const RunContext& context);
 
 // One run on parts twice as fine, and on the same rays with the irradiance averaged back to
 // `settings.refinement` after every order: their difference falls with the square of the part's size, and so
-// corrects the coarse result (Richardson). Pair by pair where the lights and views are few.
-MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, int n_threads,
-                           const Monitor& monitor);
+// corrects the coarse result (Richardson). Pair by pair where the lights and views are few. falling: ratio of
+// one order to the one before, albedo included; two orders do where they fall fast, four are measured else.
+MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& settings, double falling,
+                           int n_threads, const Monitor& monitor);
 
 }  // namespace gonio
