@@ -78,18 +78,24 @@ std::vector<Matrix> low_orders(const LinkOperator& op1, const LinkOperator& op2,
                   other = same ? Carried{} : carry(op1, op2, tile, views, twice, average_to, n_threads);
     const Carried& view = same ? light : other;
     std::vector<Matrix> orders(n_orders, Matrix(lights.n_columns(), views.n_columns()));
-    auto add = [&](int order, const Fields& a, const Fields& b) {
-        add_products(tile, {{&a, 1}}, {{&b, 1}}, 0.5, n_threads, orders[order - 2]);
+    auto add = [&](int order, const Combination& a, const Combination& b, double scale) {
+        add_products(tile, a, b, scale, n_threads, orders[order - 2]);
     };
-    add(2, light.k1, views);
-    add(2, light.k2, views);
-    add(3, light.k1, view.k2);
-    add(3, light.k2, view.k1);
+    // <a l, b v> and <b l, a v>, which are transposes of each other if the lights are the views.
+    auto add_both_ways = [&](int order, const Fields Carried::*a, const Fields Carried::*b) {
+        Matrix& sum = orders[order - 2];
+        add(order, {{&(light.*a), 1}}, {{&(view.*b), 1}}, 0.5);
+        if (!same) return add(order, {{&(light.*b), 1}}, {{&(view.*a), 1}}, 0.5);
+        const Matrix one_way = sum;
+        for (int i = 0; i < sum.rows; ++i)
+            for (int j = 0; j < sum.columns; ++j) sum(i, j) += one_way(j, i);
+    };
+    add(2, {{&light.k1, 1}, {&light.k2, 1}}, {{&views, 1}}, 0.5);
+    add_both_ways(3, &Carried::k1, &Carried::k2);
     if (!twice) return orders;
-    add(4, light.k2k1, view.k1);
-    add(4, light.k1k2, view.k2);
-    add(5, light.k2k1, view.k1k2);
-    add(5, light.k1k2, view.k2k1);
+    add(4, {{&light.k2k1, 1}}, {{&view.k1, 1}}, 0.5);
+    add(4, {{&light.k1k2, 1}}, {{&view.k2, 1}}, 0.5);
+    add_both_ways(5, &Carried::k2k1, &Carried::k1k2);
     return orders;
 }
 
