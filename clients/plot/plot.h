@@ -29,6 +29,7 @@ struct PlotSeries {
     std::string name;
     std::vector<double> x, y;
     bool is_dashed = false;  // for references and extrapolations
+    int category = -1;       // series that belong together share a colour; -1: one of its own
 };
 
 struct LinePlotOptions {

@@ -34,30 +34,30 @@ void plot_lines(const std::vector<PlotSeries>& series, const std::string& path,
     if (!(x_low <= x_high)) throw Error(ErrorCode::invalid_input, "series", "", "there is no point to draw");
 
     const double width = 640, height = 440, legend_row = 16;
-    draw_figure(path, width, height + legend_row * static_cast<double>((series.size() + 1) / 2),
-                [&](Canvas& canvas) {
-                    canvas.text({20, 24}, options.title, 15, ink, Align::left, true);
-                    const Frame frame{{78, 46},
-                                      width - 100,
-                                      height - 120,
-                                      enclosing_scale(x_low, x_high, options.log_x),
-                                      enclosing_scale(y_low, y_high, options.log_y)};
-                    frame.draw(canvas, options.x_label, options.y_label);
-                    for (size_t k = 0; k < curves.size(); ++k) {
-                        std::vector<Point> points;
-                        for (const Point& p : curves[k]) points.push_back(frame.at(p.x, p.y));
-                        const Colour colour = category_colour(k);
-                        canvas.line(points, colour, 2, series[k].is_dashed);
-                        if (!series[k].is_dashed)
-                            for (const Point& p : points) canvas.disk(p, 3.2, colour);
-                        const Point key{frame.corner.x + (k % 2 ? 0.5 * frame.width : 0),
-                                        height - 22 + legend_row * static_cast<double>(k / 2)};
-                        canvas.line({{key.x, key.y}, {key.x + 24, key.y}}, colour, 2, series[k].is_dashed);
-                        canvas.text({key.x + 30, key.y}, series[k].name, 11, ink);
-                    }
-                    canvas.text({20, height + legend_row * static_cast<double>((series.size() + 1) / 2) - 10},
-                                options.caption, 9.5, grey);
-                });
+    draw_figure(
+        path, width, height + legend_row * static_cast<double>((series.size() + 1) / 2), [&](Canvas& canvas) {
+            canvas.text({20, 24}, options.title, 15, ink, Align::left, true);
+            const Frame frame{{78, 46},
+                              width - 100,
+                              height - 120,
+                              enclosing_scale(x_low, x_high, options.log_x),
+                              enclosing_scale(y_low, y_high, options.log_y)};
+            frame.draw(canvas, options.x_label, options.y_label);
+            for (size_t k = 0; k < curves.size(); ++k) {
+                std::vector<Point> points;
+                for (const Point& p : curves[k]) points.push_back(frame.at(p.x, p.y));
+                const Colour colour = category_colour(series[k].category < 0 ? k : series[k].category);
+                canvas.line(points, colour, 2, series[k].is_dashed);
+                if (!series[k].is_dashed)
+                    for (const Point& p : points) canvas.disk(p, 3.2, colour);
+                const Point key{frame.corner.x + (k % 2 ? 0.5 * frame.width : 0),
+                                height - 22 + legend_row * static_cast<double>(k / 2)};
+                canvas.line({{key.x, key.y}, {key.x + 24, key.y}}, colour, 2, series[k].is_dashed);
+                canvas.text({key.x + 30, key.y}, series[k].name, 11, ink);
+            }
+            canvas.text({20, height + legend_row * static_cast<double>((series.size() + 1) / 2) - 10},
+                        options.caption, 9.5, grey);
+        });
 }
 
 }  // namespace gonio

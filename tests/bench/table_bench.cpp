@@ -151,8 +151,8 @@ int main(int argc, char** argv) {
             if (key.find("CPU second") != std::string::npos)
                 line(format("# %s: path tracer %.1f s a table at %.2e; %s %.2f", cases[c].name, pt_seconds,
                             pt_error, key.c_str(), value));
-        PlotSeries gonio{std::string("gonio, ") + cases[c].name, {}, {}, false},
-            path{std::string("path tracer, ") + cases[c].name, {}, {}, true};
+        PlotSeries gonio{std::string("gonio, ") + cases[c].name, {}, {}, false, c},
+            path{std::string("path tracer, ") + cases[c].name, {}, {}, true, c};
         for (const double target : {0.01, 0.003, 0.001}) {
             std::vector<double> seconds, errors, reported;
             for (int seed = 1; seed <= 3; ++seed) {
