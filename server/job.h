@@ -34,7 +34,8 @@ using SurfaceSource = std::variant<FileSurface, GridSurface, GeneratedSurface>;
 
 struct MaterialSource {
     Material material;       // complete, or with an empty reflectance if there is a map
-    std::string albedo_map;  // path of an image registered to the stored surface; empty for constant albedo
+    // Paths of images registered to the stored surface, one a channel; empty for constant albedo.
+    std::vector<std::string> albedo_maps;
 };
 
 // What is measured. A new kind is one alternative here, one parser (server/README.md says where) and one

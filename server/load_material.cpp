@@ -48,7 +48,9 @@ RawHeights read_albedos(const std::string& path) {
     return raw;
 }
 
-Lambertian load_map(const std::string& path, const SurfaceSource& source, const LoadedSurface& loaded) {
+// One channel's map, appended to the channels before it.
+void load_map(const std::string& path, const SurfaceSource& source, const LoadedSurface& loaded,
+              Lambertian& lambertian) {
     RawHeights raw = read_albedos(path);
     const int nx = loaded.stored_nx ? loaded.stored_nx : loaded.surface.nx;
     const int ny = loaded.stored_ny ? loaded.stored_ny : loaded.surface.ny;
@@ -58,16 +60,14 @@ Lambertian load_map(const std::string& path, const SurfaceSource& source, const 
                         std::to_string(ny));
     }
     const HeightField map = prepare_surface(std::move(raw), registration(source)).surface;
-    Lambertian lambertian;
     lambertian.map_nx = loaded.surface.nx, lambertian.map_ny = loaded.surface.ny;
-    lambertian.map.reserve(loaded.surface.heights.size());
+    lambertian.map.reserve(lambertian.map.size() + loaded.surface.heights.size());
     for (int j = 0; j < lambertian.map_ny; ++j) {
         for (int i = 0; i < lambertian.map_nx; ++i) {
             const float above_mean = map.at(mirrored_cell(i, map.nx), mirrored_cell(j, map.ny));
             lambertian.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
         }
     }
-    return lambertian;
 }
 
 }  // namespace
@@ -75,8 +75,12 @@ Lambertian load_map(const std::string& path, const SurfaceSource& source, const 
 Material load_material(const MaterialSource& source, const SurfaceSource& surface_source,
                        const LoadedSurface& surface) {
     Material material = source.material;
-    if (!source.albedo_map.empty())
-        material.reflectance = load_map(source.albedo_map, surface_source, surface);
+    if (!source.albedo_maps.empty()) {
+        Lambertian lambertian;
+        for (const std::string& path : source.albedo_maps)
+            load_map(path, surface_source, surface, lambertian);
+        material.reflectance = std::move(lambertian);
+    }
     validate(material, surface.surface.nx, surface.surface.ny);
     return material;
 }

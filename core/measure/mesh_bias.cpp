@@ -207,8 +207,14 @@ MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& setting
     // surface of so few facets that they average little.
     const int n_orders = falling > 0.5 ? 4 : 2;
     const double cells = static_cast<double>(context.surface->nx) * context.surface->ny;
+    // Each direction lists the cells that its rays cross: about 200 bytes a cell of travel, which is as long
+    // as the relief is high. A spike of 1e5 cells would take 10 GB.
+    const double travel = std::clamp(static_cast<double>(context.grid->highest - context.grid->lowest), 1.0,
+                                     max_march_travel),
+                 most = std::max(256.0, 1e9 / (200 * travel));
     const int n_directions =
-                  std::max(settings.directions, static_cast<int>(std::clamp(4e6 / cells, 1024.0, 8192.0))),
+                  std::max(settings.directions,
+                           static_cast<int>(std::min(most, std::clamp(4e6 / cells, 1024.0, 8192.0)))),
               n_places = static_cast<int>(std::clamp(16384 / cells, 1.0, 16.0));
     const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
     const Irradiance irradiance = compute_irradiance(

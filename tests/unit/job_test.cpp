@@ -484,6 +484,24 @@ TEST_F(AlbedoMap, MirrorsCellsAndNotNodes) {
     }
 }
 
+TEST_F(AlbedoMap, HasAFileForEachChannel) {
+    std::ofstream(folder_ / "dark.txt") << "0 0 0.1\n0 0 0\n";
+    const auto loaded = [&](const json& albedo) {
+        json document = base_document({{"material", {{"albedo", albedo}}}});
+        document["surface"] = {{"grid", {{0, 1, 2}, {3, 4, 5}}}, {"pitch", "1 mm"}, {"height_scale", "1 um"}};
+        return load_job(parse_job(document.dump(), {"x", folder_.string()})).material;
+    };
+    const Material rgb = loaded({{"files", {"map.txt", "dark.txt", "map.txt"}}});
+    EXPECT_EQ(rgb.channels, (std::vector<std::string>{"r", "g", "b"}));
+    expect_map(std::get<Lambertian>(rgb.reflectance),
+               {0, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4, 0.5});
+    const Material spectrum = loaded({{"wavelengths_nm", {450, 600}}, {"files", {"dark.txt", "map.txt"}}});
+    EXPECT_EQ(spectrum.channels, (std::vector<std::string>{"450nm", "600nm"}));
+    expect_map(std::get<Lambertian>(spectrum.reflectance), {0, 0, 0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4, 0.5});
+    EXPECT_THROW(loaded({{"files", {"map.txt", "dark.txt"}}}), Error);
+    EXPECT_THROW(loaded({{"wavelengths_nm", {450, 600}}, {"files", {"map.txt"}}}), Error);
+}
+
 TEST_F(AlbedoMap, ChangesTheHashOfTheJob) {
     const auto hash = [&] {
         json document = base_document({{"material", {{"albedo", {{"file", "map.txt"}}}}}});
