@@ -60,7 +60,6 @@ ordered_json to_json(const Report& report) {
             {"skipped", object(report.skipped)},
             {"counters", object(report.counters)},
             {"seconds", object(report.seconds)},
-            {"directional_albedo", report.directional_albedo},
             {"warnings", report.warnings}};
 }
 

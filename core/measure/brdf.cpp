@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "base/parallel.h"
+#include "measure/describe.h"
 #include "measure/estimate.h"
 #include "measure/planning.h"
 #include "measure/simplify.h"
@@ -19,12 +20,6 @@ namespace {
 
 constexpr int most_stages = 12;
 constexpr double default_target = 0.01;
-
-std::string number(double x) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.4g", x);
-    return text;
-}
 
 // Everything that one measurement carries from stage to stage.
 class Measurement {
@@ -131,16 +126,12 @@ class Measurement {
         if (!context_.view_to_light.empty())
             report.skipped.push_back({"half of the directions", "lights and views are the same set"});
         context_.skip_steep = options_.allow_skips;
-        context_.combine_orders = options_.allow_skips && plan_.max_order == 0 && !plan_.separate_orders &&
-                                  result_.table.channels.size() == 1 && !scene_.material.is_map();
-        if (scene_.material.is_map() && !plan_.separate_orders && plan_.max_order == 0 &&
-            options_.allow_skips)
-            context_.combine_orders = true;
+        context_.keep_orders = plan_.separate_orders || !options_.allow_skips;
         context_.max_order = plan_.max_order;
         if (result_.table.channels.size() > 1 && !scene_.material.is_map())
             report.skipped.push_back(
                 {"all channels but one", "constant albedo: orders are kept apart and serve every channel"});
-        if (context_.combine_orders)
+        if (!context_.keep_orders && (result_.table.channels.size() == 1 || scene_.material.is_map()))
             report.skipped.push_back(
                 {"a product per order", "one channel, orders not asked for: they are summed first"});
 
@@ -156,7 +147,7 @@ class Measurement {
         } else {
             skipped_bound_ = 0;
         }
-        context_.series_tolerance = std::clamp(0.02 * target(), 1e-6, 2e-3);
+        context_.series_tolerance = std::clamp(0.05 * target(), 1e-6, 1e-3);
         if (context_.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
     }
 
@@ -179,7 +170,6 @@ class Measurement {
     void run_stage(Stage& stage, int n_runs);
     void find_mesh_bias(const std::vector<Stage>& stages);
     bool ends_in_time(const Stage& stage, NextStep& step) const;
-    void fill_report(const std::vector<Stage>& stages, const Estimate& estimate);
 
     const BrdfPlan& plan_;
     RunOptions options_;
@@ -350,6 +340,7 @@ void Measurement::measure() {
         e = make_estimate(context_, groups_, stages, mesh_bias_, skipped_bound_);
     }
 
+    Report& report = result_.report;
     Table& table = result_.table;
     const size_t n = e.f.size();
     table.orders = static_cast<int>(n / (table.channels.size() * table.rows())) - 1;
@@ -365,64 +356,10 @@ void Measurement::measure() {
         table.se[i] = static_cast<float>(e.se[i]);
         table.bias[i] = static_cast<float>(e.bias[i]);
     }
-    fill_report(stages, e);
-}
-
-void Measurement::fill_report(const std::vector<Stage>& stages, const Estimate& e) {
-    Report& report = result_.report;
-    const double wanted = target();
-    const RunSettings& last = stages.back().settings;
-    int runs = 0;
-    for (const Stage& s : stages) runs += s.f.count();
     report.relative_error = e.total;
     report.target_met = wanted == 0 || e.total <= wanted;
-    const std::string side = std::to_string(tile_core);
-    report.settings = {
-        {"transport", "diffuse operator"},
-        {"simd", simd_target()},
-        {"sub_samples", std::to_string(last.sub_samples)},
-        {"directions", std::to_string(last.directions)},
-        {"refinement", std::to_string(last.refinement)},
-        {"windows", last.tiles_x == 0 ? "whole period"
-                                      : std::to_string(last.tiles_x * last.tiles_y) + " a run of " + side +
-                                            " x " + side + " cells"},
-        {"runs", std::to_string(stages.back().f.count()) + " (" + std::to_string(runs) + " in " +
-                     std::to_string(stages.size()) + " stages)"},
-        {"mesh_bias", mesh_bias_.measured() ? "two grids: second order corrected by " +
-                                                  number(100 * mesh_bias_.share_of_order(2).correction) + " %"
-                                            : "guessed from the relief"},
-        {"noise_bias", "corrected by " +
-                           number(stages.back().noise
-                                      ? -100 * stages.back().noise->kappa * std::pow(albedo_range().second, 2)
-                                      : 0) +
-                           " % of the direct part"},
-        {"relative_error", number(e.total)}};
-    report.counters = {
-        {"rays", totals_.rays},
-        {"rays skipped (steeper than the relief)", totals_.rays_skipped},
-        {"links", totals_.links},
-        {"links substituted at window borders", totals_.substituted},
-        {"links dropped at window borders", totals_.dropped},
-        {"nearly horizontal bundles given up", static_cast<double>(totals_.truncated_bundles)}};
-    report.seconds = {{"visibility and direct light", totals_.seconds_direct},
-                      {"operator", totals_.seconds_links},
-                      {"orders of scattering", totals_.seconds_series},
-                      {"wall", seconds()}};
-    if (totals_.rays_skipped > 0)
-        report.skipped.push_back({"shadow tests of steep directions", "they are steeper than every facet"});
-    if (last.tiles_x > 0)
-        report.skipped.push_back({"most receivers", "windows of the surface reach the error asked for"});
-    int unresolved = 0;
-    for (const Moments* projected : {&stages.back().projected_lights, &stages.back().projected_views})
-        for (const double ratio : projected->mean())
-            unresolved += last.tiles_x == 0 && scene_.surface.border_x == 0 && unresolved_share(ratio) > 0;
-    if (unresolved > 0) {
-        report.counters.push_back(
-            {"directions whose lit slivers were not resolved", static_cast<double>(unresolved)});
-        report.warnings.push_back(std::to_string(unresolved) +
-                                  " directions graze the relief so that samples miss what they light: their "
-                                  "bias column says so; more sub_samples help");
-    }
+    describe_runs(context_, stages, mesh_bias_, totals_, report);
+    report.seconds.emplace_back("wall", seconds());
     if (!report.target_met)
         report.warnings.push_back("target_relative_error " + number(wanted) +
                                   " was not reached: " + number(e.total));

@@ -123,9 +123,8 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                     const Noisy noisy = stage.noise ? noise_of(context, *stage.noise, stage.ratio, groups, c,
                                                                slice, r, direct, indirect, below)
                                                     : Noisy{};
-                    const double continued =
-                        slice == 0 ? series_continuation_error * stage.remainder * (direct + 2 * indirect)
-                                   : 0.0;
+                    const double left_out =
+                        slice == 0 ? stage.remainder * (direct + 2 * indirect) : 0.0;
                     const double skipped = slice == 0 ? skipped_bound * f : 0.0;
                     const int light = groups.light[r], view = context.view_to_light.empty()
                                                                   ? groups.view[r]
@@ -140,7 +139,7 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                     e.se[i] += std::pow(share * se[s][c * slices + slice][r], 2);
                     e.bias[i] +=
                         share * (typical_share * std::hypot(mesh.uncertainty_of(light, view) * indirect,
-                                                            noisy.doubt, continued) +
+                                                            noisy.doubt, left_out) +
                                  skipped + lost * ceiling);
                 }
             }

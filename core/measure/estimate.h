@@ -18,7 +18,7 @@ struct Stage {
     RunSettings settings;
     int number = 0;
     Moments f, direct, projected_lights, projected_views;  // of the members of RunValues
-    double remainder = 0, ratio = 0;                       // of the continued orders, largest of its runs
+    double remainder = 0, ratio = 0;                       // of the orders (diffuse.h), largest of its runs
     std::optional<NoiseBias> noise;  // found once a stage, or taken over from one that samples K alike
 };
 

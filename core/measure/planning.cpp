@@ -53,7 +53,7 @@ double relative_cost(const RunContext& context, const RunSettings& settings, con
     return samples * refinement * worked_cells(context, settings) / worked_cells(context, reference);
 }
 
-// Measured (shared/performance E) at slope 0.7 and 32768 facets: direct error 0.11 % with one sub-sample,
+// Measured at slope 0.7 and 32768 facets: direct error 0.11 % with one sub-sample,
 // indirect error 0.75 % with 16 directions, falling as n^-1.7. What it gets wrong, the stages mend.
 RunSettings first_settings(const RunContext& context, double target) {
     RunSettings settings;

@@ -16,7 +16,6 @@ struct Report {
     std::vector<std::string> warnings;
     double relative_error = 0;  // reached, as defined in Accuracy
     bool target_met = true;
-    std::vector<double> directional_albedo;  // [channel][incident], empty when not computed
 };
 
 }  // namespace gonio

@@ -122,7 +122,8 @@ std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& t
 // Sums over the windows of a run, for one block of lights and views.
 struct Sums {
     std::vector<Matrix> direct;               // per map channel, or one
-    std::vector<std::vector<Matrix>> higher;  // [map channel or one][order]
+    std::vector<Matrix> indirect;             // per channel
+    std::vector<std::vector<Matrix>> orders;  // [map channel or one][order - 2], if kept
     std::vector<double> projected_lights, projected_views;
     double core_area = 0;
 
@@ -136,14 +137,16 @@ struct Sums {
             for (size_t k = 0; k < to.size(); ++k) to[k] += from[k];
         };
         direct.resize(irradiance.direct.size());
-        higher.resize(irradiance.direct.size());
-        for (size_t c = 0; c < direct.size(); ++c) {
-            add_matrix(irradiance.direct[c], direct[c]);
-            if (c < series.size()) {
-                higher[c].resize(std::max(higher[c].size(), series[c].higher.size()));
-                for (size_t k = 0; k < series[c].higher.size(); ++k)
-                    add_matrix(series[c].higher[k], higher[c][k]);
+        orders.resize(irradiance.direct.size());
+        for (size_t c = 0; c < direct.size(); ++c) add_matrix(irradiance.direct[c], direct[c]);
+        size_t channel = 0;
+        for (size_t s = 0; s < series.size(); ++s) {
+            for (const Matrix& sum : series[s].sums) {
+                indirect.resize(std::max(indirect.size(), channel + 1));
+                add_matrix(sum, indirect[channel++]);
             }
+            orders[s].resize(std::max(orders[s].size(), series[s].orders.size()));
+            for (size_t k = 0; k < series[s].orders.size(); ++k) add_matrix(series[s].orders[k], orders[s][k]);
         }
         add_vector(irradiance.projected_lights, projected_lights);
         add_vector(irradiance.projected_views, projected_views);
@@ -164,8 +167,7 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
     for (size_t c = 0; c < n_channels; ++c) {
         const double albedo = map ? 1.0 : context.material->albedo[c];
         const Matrix& direct = sums.direct[map ? c : 0];
-        const std::vector<Matrix>& higher = sums.higher[map ? c : 0];
-        const double x = albedo * values.ratio;
+        const std::vector<Matrix>& orders = sums.orders[map ? c : 0];
         for (const Block::Row& row : block.rows) {
             // Of a part of a surface the projected area is not A cos theta in truth: an open surface is
             // divided by the plain area.
@@ -182,18 +184,10 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
             double total = first;
             if (c == 0) values.direct[row.row] = static_cast<float>(unit * direct(row.light, row.view));
             if (slices > 1) put(1, first);
-            if (context.combine_orders) {
-                if (!higher.empty()) total += scale * higher[0](row.light, row.view);
-            } else {
-                double power = 1;
-                for (size_t k = 0; k < higher.size(); ++k) {
-                    power *= albedo;
-                    const double order = scale * power * higher[k](row.light, row.view);
-                    total += order;
-                    if (k + 2 < slices) put(k + 2, order);
-                    if (k + 1 == higher.size()) total += order * x / (1 - x);
-                }
-            }
+            if (c < sums.indirect.size()) total += scale * sums.indirect[c](row.light, row.view);
+            double power = albedo;
+            for (size_t k = 0; k < orders.size() && k + 2 < slices; ++k, power *= albedo)
+                put(k + 2, scale * power * orders[k](row.light, row.view));
             put(0, total);
         }
     }
@@ -218,7 +212,7 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
     // Irradiance, carried orders (three at once is typical), a second copy with several sub-samples or a map;
     // sums in double.
     const double copies = 4.0 + (settings.sub_samples > 1 ? 1 : 0) + (context.material->is_map() ? 1 : 0) +
-                          (context.combine_orders ? 0 : 4);
+                          (context.keep_orders || context.n_channels() > 1 ? 4 : 0);
     const double sums = static_cast<double>(padded(n_lights)) *
                         padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
     const double links =
@@ -275,11 +269,12 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                 options.max_order = context.max_order;
                 options.tolerance = context.series_tolerance;
                 options.fixed_applications = context.fixed_applications;
+                // Orders that are kept apart add up over windows only if all windows have them.
+                if (context.plan->separate_orders && context.max_order == 0 && values.applications > 0)
+                    options.fixed_applications = values.applications;
                 options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
-                if (!context.material->is_map())
-                    options.largest_albedo =
-                        *std::max_element(context.material->albedo.begin(), context.material->albedo.end());
-                if (context.combine_orders) options.combine = options.largest_albedo;
+                options.keep_orders = context.keep_orders;
+                if (!context.material->is_map()) options.albedos = context.material->albedo;
                 const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),
                              base_views = factors.size() > 1 ? irradiance.views : Fields();
                 for (size_t c = 0; c < std::max<size_t>(1, factors.size()); ++c) {
@@ -303,9 +298,8 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     values.ratio = std::max(values.ratio, series.back().ratio);
                     values.remainder = std::max(values.remainder, series.back().remainder);
                     values.applications = std::max(values.applications, series.back().applications);
-                    if (!context.combine_orders)
-                        values.higher_orders =
-                            std::max(values.higher_orders, static_cast<int>(series.back().higher.size()));
+                    values.higher_orders =
+                        std::max(values.higher_orders, static_cast<int>(series.back().orders.size()));
                 }
                 values.seconds_series += cpu_seconds() - clock;
             }

@@ -23,7 +23,7 @@ struct RunContext {
     std::vector<int> view_to_light;
     bool indirect = true;  // false: black, or too gentle for light to be scattered twice
     bool skip_steep = true;
-    bool combine_orders = true;  // one constant albedo, orders not asked for
+    bool keep_orders = false;  // single orders are wanted, or summing them first is not to be tried
     int max_order = 0;
     double series_tolerance = 1e-4;
     int fixed_applications = 0;
@@ -49,9 +49,9 @@ struct RunSettings {
 };
 
 struct RunValues {
-    int higher_orders = 0;  // single orders kept beyond the first (0 when combined)
+    int higher_orders = 0;  // single orders kept beyond the first
     int applications = 0;
-    double ratio = 0, remainder = 0;  // of the geometric continuation, see OrderSeries
+    double ratio = 0, remainder = 0;  // largest, see OrderSeries
     // f in 1/sr, [channel][slice][row]; slices as in Table: 0 the sum, then single orders if they are kept
     // apart for the table.
     std::vector<float> f;

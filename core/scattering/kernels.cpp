@@ -57,8 +57,11 @@ void links_loop(const LinkRecord* records, size_t n_records, const Link* links, 
         const uint32_t begin = records[r].begin, end = records[r + 1].begin;
         if (r + 1 < n_records)
             for (uint32_t k = end; k < records[r + 2].begin; ++k) {
-                hwy::Prefetch(x + static_cast<size_t>(links[k].seen) * 32);
-                hwy::Prefetch(y + static_cast<size_t>(links[k].seen) * 32);
+                const size_t at = static_cast<size_t>(links[k].seen) * 32;
+                hwy::Prefetch(x + at);
+                hwy::Prefetch(x + at + 16);
+                hwy::Prefetch(y + at);
+                hwy::Prefetch(y + at + 16);
             }
         for (size_t c = 0; c < 32; c += 2 * lanes) {
             const auto own0 = hn::LoadU(d, x_p + c), own1 = hn::LoadU(d, x_p + c + lanes);
