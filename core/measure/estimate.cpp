@@ -28,11 +28,6 @@ double albedo_of(const RunContext& context, size_t channel) {
     return context.material->is_map() ? 1.0 : context.material->albedo[channel];
 }
 
-// The uncertainties that make up the bias column are rms over pairs, and a few pairs hold most of each: with
-// them as they are, f lies within one sigma of the truth for 76 % of all values, not 68 %
-// (tests/agreement/honest_errors_test.cpp).
-constexpr double typical_share = 0.7;
-
 double mean_albedo(const Lambertian& m, size_t channel) {
     if (!m.is_map()) return m.albedo[channel];
     const size_t n = static_cast<size_t>(m.map_nx) * m.map_ny;
@@ -129,18 +124,18 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                     const int light = groups.light[r], view = context.view_to_light.empty()
                                                                   ? groups.view[r]
                                                                   : context.view_to_light[groups.view[r]];
+                    const double cos_light = context.lights[groups.light[r]].z,
+                                 cos_view = context.views[groups.view[r]].z;
                     // What could not be sampled: f is at most albedo / (pi cos) on either side, as no facet
                     // gets more light than the beam carries.
                     const double lost = unresolved[r],
-                                 ceiling = lost < 1 ? f
-                                                    : 1 / (pi * std::max(context.lights[groups.light[r]].z,
-                                                                         context.views[groups.view[r]].z));
+                                 ceiling = lost < 1 ? f : 1 / (pi * std::max(cos_light, cos_view));
+                    const double mesh_doubt =
+                        mesh.uncertainty_of(light, view, std::min(cos_light, cos_view)) * indirect;
                     e.f[i] += share * (f - noisy.amount + mesh.correction_of(light, view) * indirect);
                     e.se[i] += std::pow(share * se[s][c * slices + slice][r], 2);
                     e.bias[i] +=
-                        share * (typical_share * std::hypot(mesh.uncertainty_of(light, view) * indirect,
-                                                            noisy.doubt, left_out) +
-                                 skipped + lost * ceiling);
+                        share * (std::hypot(mesh_doubt, noisy.doubt, left_out) + skipped + lost * ceiling);
                 }
             }
         }

@@ -123,11 +123,14 @@ MeshShare compare_grids(const Matrix& exact, const Matrix& coarse, const std::ve
 
 }  // namespace
 
-double MeshShare::uncertainty_of(int light, int view) const {
-    if (pairs.values.empty()) return uncertainty;
-    // Measured against runs of refinement 4 (slopes 0.7 and 1.5, correlation lengths 2 and 8) and on grooves
-    // whose walls are one facet: a quarter is left where the correction is large, up to half where small.
-    constexpr double left = 0.3;
+double MeshShare::uncertainty_of(int light, int view, double lowest_cos) const {
+    // Grazing light falls on crests alone, where irradiance varies most over a facet. Measured on two grids,
+    // on the reliefs of tests/agreement/honest_surfaces.h, as shares of the rms over all pairs: 0.1 to 0.3
+    // within 40 degrees, 0.1 to 1 at 60, 1.5 to 1.8 at 80.
+    if (pairs.values.empty()) return uncertainty * (0.2 + 0.3 * (1 / std::max(lowest_cos, 0.1) - 1));
+    // Measured against much longer runs of refinement 4, on the reliefs of tests/agreement/honest_surfaces.h: 0.1
+    // to 0.2 of the correction is left, and up to half where it is small.
+    constexpr double left = 0.2;
     return left * std::hypot(pairs(light, view), typical);
 }
 
@@ -172,9 +175,13 @@ MeshBias predict_mesh_bias(const HeightField& surface) {
                       2;
             total += g.x * g.x + g.y * g.y;
         }
-    const double roughness = total > 0 ? std::sqrt(change / total) : 0;
+    if (!(total > 0)) return {};
+    const double squared_roughness = change / total,
+                 rms_slope = std::sqrt(total / (static_cast<double>((surface.ny + step - 1) / step) * surface.nx));
+    // rms over pairs of what two grids measure on Gaussian fields, slopes 0.3 to 3 and correlation lengths of 2
+    // to 12 cells, within 15 % (30 % at slope 0.3).
     MeshBias bias;
-    bias.guess = 0.018 * roughness * roughness;
+    bias.guess = 0.0225 * squared_roughness * rms_slope / std::sqrt(1 + rms_slope * rms_slope / 4);
     return bias;
 }
 

@@ -8,14 +8,15 @@ namespace gonio {
 // Relative: true = computed * (1 + correction), with `uncertainty` left (one sigma). Of each pair (lights x
 // views, or x lights if those are the views) where `pairs` is filled, else one for all of them.
 struct MeshShare {
-    double correction = 0, uncertainty = 0;  // of all pairs
+    double correction = 0, uncertainty = 0;  // of all pairs (rms)
     Matrix pairs;
     double typical = 0;  // rms of `pairs` over the table, weighted by value
 
     double correction_of(int light, int view) const {
         return pairs.values.empty() ? correction : pairs(light, view);
     }
-    double uncertainty_of(int light, int view) const;
+    // lowest_cos: cosine of the more grazing of the two.
+    double uncertainty_of(int light, int view, double lowest_cos) const;
 };
 
 // What two grids gave for the orders of scattering 2 and 3, or 2 to 5, at albedo 1; nothing, where the bias
@@ -33,8 +34,9 @@ struct MeshBias {
     MeshShare share_of_order(int order) const;  // order >= 2
 };
 
-// Guess from how much neighbouring facets differ in tilt, calibrated on two-grid runs of Gaussian fields: 0.1
-// % (correlation length 8 cells) to 0.8 % (2 cells) of the indirect part. No run.
+// Guess from how much neighbouring facets differ in tilt and from the slope, calibrated on two-grid runs of
+// Gaussian fields: at slope 0.7 0.1 % (correlation length 8 cells) to 1.4 % (2 cells) of the indirect part. No
+// run.
 MeshBias predict_mesh_bias(const HeightField& surface);
 
 // Whether the relief is such as the guess was calibrated on: not if it has few facets, or facets much taller

@@ -1,7 +1,7 @@
 // Honest errors: the true error lies within 1, 2 and 3 times sqrt(se^2 + bias^2) as often as a normal deviate
 // would, within 5 points, over thousands of table entries. Truth: closed forms and the reference answers of
 // ../validation for V-grooves, which their grids are exactly, and data/honest_*.json
-// (make_honest_references.cpp) for Gaussian fields.
+// (make_honest_references.cpp) for other reliefs.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -15,7 +15,7 @@
 namespace gonio {
 namespace {
 
-constexpr int n_seeds = 12;
+constexpr int n_seeds = 8;
 
 // Counts entries whose error is within k stated errors; the parts are shown when a bar is missed, for too
 // wide and too narrow have different cures.
@@ -55,10 +55,10 @@ struct Coverage {
     }
 };
 
-Coverage gaussian_field(const honest::GaussianSurface& field, double target) {
-    const HeightField surface = field.make();
+Coverage table_of(const honest::Relief& relief, double target) {
+    const HeightField surface = relief.make();
     const nlohmann::json truth =
-        reference::load_json(std::string("../../agreement/data/honest_") + field.name);
+        reference::load_json(std::string("../../agreement/data/honest_") + relief.name);
     EXPECT_EQ(truth.at("surface_hash"), surface_hash(surface));
     const std::vector<double> values = truth.at("f");
     Coverage coverage;
@@ -70,11 +70,11 @@ Coverage gaussian_field(const honest::GaussianSurface& field, double target) {
         for (size_t k = 0; k < values.size(); ++k)
             coverage.add(values[k], table.f[k], table.se[k], table.bias[k]);
     }
-    // A truth that is to judge must be much better than what it judges.
-    EXPECT_LT(5 * std::hypot(truth.at("rms_relative_se").get<double>(),
+    // A truth three times better than what it judges adds 5 % to the errors.
+    EXPECT_LT(3 * std::hypot(truth.at("rms_relative_se").get<double>(),
                              truth.at("rms_relative_bias").get<double>()),
               coverage.rms(coverage.error))
-        << field.name;
+        << relief.name;
     return coverage;
 }
 
@@ -124,27 +124,37 @@ Coverage v_groove_direct(double alpha_deg, double target) {
 
 class HonestErrors : public testing::TestWithParam<double> {};
 
-TEST_P(HonestErrors, CoverTheTruthAsOftenAsTheyShould) {
-    const double target = GetParam();
+void expect_honest(const std::vector<std::pair<std::string, Coverage>>& parts, double target) {
     Coverage all;
-    std::string parts;
-    const auto count = [&](const std::string& name, const Coverage& coverage) {
+    std::string text;
+    for (const auto& [name, coverage] : parts) {
         all.add(coverage);
-        parts += "\n  " + name + ": " + coverage.text();
-    };
-    for (const honest::GaussianSurface& field : honest::gaussian_surfaces)
-        count(field.name, gaussian_field(field, target));
-    for (const char* name : {"vgroove_a20", "vgroove_a45", "vgroove_a70"})
-        count(name, v_groove(name, target));
-    for (const double alpha_deg : {33.0, 60.0})
-        count("direct light of a groove", v_groove_direct(alpha_deg, target));
+        text += "\n  " + name + ": " + coverage.text();
+    }
     EXPECT_GT(all.entries, 5000);
     const double normal[] = {68.3, 95.4, 99.7};
     for (int k = 0; k < 3; ++k)
-        EXPECT_NEAR(all.percent(k), normal[k], 5)
-            << "within " << k + 1 << " sigma, target " << target << parts;
-    RecordProperty("coverage", all.text() + parts);
-    std::printf("target %g: %s%s\n", target, all.text().c_str(), parts.c_str());
+        EXPECT_NEAR(all.percent(k), normal[k], 5) << "within " << k + 1 << " sigma, target " << target << text;
+    std::printf("target %g: %s%s\n", target, all.text().c_str(), text.c_str());
+}
+
+TEST_P(HonestErrors, CoverTheTruthAsOftenAsTheyShould) {
+    std::vector<std::pair<std::string, Coverage>> parts;
+    for (const honest::Relief& relief : honest::reliefs)
+        if (relief.seen_before) parts.emplace_back(relief.name, table_of(relief, GetParam()));
+    for (const char* name : {"vgroove_a20", "vgroove_a45", "vgroove_a70"})
+        parts.emplace_back(name, v_groove(name, GetParam()));
+    for (const double alpha_deg : {33.0, 60.0})
+        parts.emplace_back("direct light of a groove", v_groove_direct(alpha_deg, GetParam()));
+    expect_honest(parts, GetParam());
+}
+
+// No constant of the engine was measured on these.
+TEST_P(HonestErrors, CoverTheTruthOfReliefsNeverSeenBefore) {
+    std::vector<std::pair<std::string, Coverage>> parts;
+    for (const honest::Relief& relief : honest::reliefs)
+        if (!relief.seen_before) parts.emplace_back(relief.name, table_of(relief, GetParam()));
+    expect_honest(parts, GetParam());
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, HonestErrors, testing::Values(0.01, 0.002));
@@ -152,7 +162,7 @@ INSTANTIATE_TEST_SUITE_P(Targets, HonestErrors, testing::Values(0.01, 0.002));
 // The truth itself, judged by the path tracer when it was made: no more than its own noise apart, and no
 // shift of the whole table.
 TEST(HonestTruth, AgreesWithThePathTracer) {
-    for (const honest::GaussianSurface& field : honest::gaussian_surfaces) {
+    for (const honest::Relief& field : honest::reliefs) {
         const nlohmann::json truth =
             reference::load_json(std::string("../../agreement/data/honest_") + field.name);
         const nlohmann::json& traced = truth.at("path_tracer");

@@ -47,7 +47,7 @@ nlohmann::json cross_check(const Table& reference, const Table& traced, long lon
 
 int main(int argc, char** argv) {
     if (argc != 3) return std::fprintf(stderr, "usage: %s NAME OUT.json\n", argv[0]), 1;
-    const honest::GaussianSurface& field = honest::gaussian_surface(argv[1]);
+    const honest::Relief& field = honest::relief(argv[1]);
     const HeightField surface = field.make();
     BrdfPlan plan = honest::plan();
     plan.accuracy.seed = 1'000'003;

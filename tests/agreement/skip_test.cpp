@@ -115,18 +115,19 @@ TEST(Skip, SteepDirectionsNeedNoShadowTest) {
     expect_tables_near(result.skipping.table, result.all.table, 1e-5);
 }
 
+// The orders of one run, weighed for each albedo, against runs for each albedo alone. These skip nothing, so
+// that all measure the mesh bias on two grids: a dark surface alone would only guess it.
 TEST(Skip, OneRunServesAllChannels) {
     const std::vector<double> albedos = {0.2, 0.5, 0.9};
-    const BrdfResult three = measure(rough(), gray(albedos), plan_of(lights, views, few));
+    const HeightField fine = generate_gaussian(48, 48, 1e-4, 2e-4, 0.7, 5);
+    const BrdfResult three = measure(fine, gray(albedos), plan_of(lights, views, few));
     EXPECT_TRUE(was_skipped(three.report, "all channels but one"));
+    ASSERT_FALSE(was_skipped(three.report, "two-grid run"));
     for (size_t c = 0; c < 3; ++c) {
-        const Table one = measure(rough(), gray({albedos[c]}), plan_of(lights, views, few)).table;
-        // Whether a second grid is worth its time may be answered otherwise for each albedo: within the bias.
+        const Table one = measure(fine, gray({albedos[c]}), plan_of(lights, views, few), false).table;
         for (size_t row = 0; row < one.rows(); ++row) {
             const size_t k = three.table.index(c, 0, row);
-            EXPECT_NEAR(three.table.f[k], one.f[row],
-                        1e-5 * one.f[row] + 2 * std::hypot(three.table.bias[k], one.bias[row]))
-                << "albedo " << albedos[c];
+            EXPECT_NEAR(three.table.f[k], one.f[row], 1e-4 * one.f[row]) << "albedo " << albedos[c];
         }
     }
 }

@@ -285,14 +285,14 @@ TEST(Diffuse, RemainderIsTheErrorOfTheSums) {
     for (const auto& [name, surface] : cases) {
         const Scene scene(surface, 1, 48);
         const Matrix truth = plain_sum(scene);
-        for (const int applications : {2, 3, 4, 6}) {
+        for (const int applications : {1, 2, 3, 4, 6}) {
             SeriesOptions options;
             options.fixed_applications = applications;
             const OrderSeries few = scene.symmetric(options);
             const double error = rms_error(scene, few.sums[0], truth);
             // Rounding of float fields ends what can be seen.
-            EXPECT_LT(error, std::max(few.remainder, 1e-6)) << name << ", " << applications << " applications";
-            EXPECT_GT(error, few.remainder / 100 - 1e-6) << name << ", " << applications << " applications";
+            EXPECT_LT(error, std::max(2 * few.remainder, 1e-6)) << name << ", " << applications;
+            EXPECT_GT(error, few.remainder / 40 - 1e-6) << name << ", " << applications;
         }
     }
 }
@@ -376,7 +376,8 @@ TEST(Diffuse, SeriesSeesReliefWhereverItLies) {
         options.fixed_applications = 40;
         const OrderSeries long_one = scene.symmetric(options);
         const Matrix &got = series.sums[0], &expected = long_one.sums[0];
-        EXPECT_NEAR(got(0, 0), expected(0, 0), 2e-3 * expected(0, 0)) << "pit at row " << at;
+        EXPECT_GT(expected(0, 0), 100 * options.tolerance * scene.same.direct[0](0, 0));
+        EXPECT_NEAR(got(0, 0), expected(0, 0), options.tolerance * scene.same.direct[0](0, 0)) << at;
     }
 }
 
