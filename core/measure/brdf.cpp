@@ -262,7 +262,7 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
     const double guess =
         safe_sqrt(with.systematic * with.systematic - without.systematic * without.systematic);
     if (options_.allow_skips && mesh_bias_is_predictable(context_) &&
-        3 * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
+        mesh_bias_.guess_caution * guess < std::max(target(), explicit_samples ? with.random : 0.0)) {
         if (stages.size() == 1)
             result_.report.skipped.push_back(
                 {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});

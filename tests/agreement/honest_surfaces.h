@@ -40,10 +40,10 @@ inline const std::vector<Relief> reliefs{
     {"egg_crate", true, [] { return generate_egg_crate(32, 32, 5); }},
     {"lava_rock", true, [] { return sample("lava_rock_256_16bit.png", 50e-3, 10e-3); }},
     {"wool", true, [] { return sample("wool_256_8bit.png", 40e-3, 4e-3); }},
+    {"tiles", true, [] { return sample("tiles_256_8bit.png", 1, 60e-3); }},
     {"dunes", false, [] { return generate_gaussian(64, 64, 1, 5, 0.9, 41); }},
     {"crags", false, [] { return generate_gaussian(64, 64, 1, 4, 1.6, 42); }},
-    {"velvet", false, [] { return generate_gaussian(64, 64, 1, 2.5, 0.5, 43); }},
-    {"tiles", false, [] { return sample("tiles_256_8bit.png", 1, 60e-3); }}};
+    {"velvet", false, [] { return generate_gaussian(64, 64, 1, 2.5, 0.5, 43); }}};
 
 inline const Relief& relief(const std::string& name) {
     for (const Relief& r : reliefs)

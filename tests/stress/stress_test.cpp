@@ -158,7 +158,10 @@ TEST(Stress, LonePitInALargeField) {
         ASSERT_EQ(table.orders, 30);
         for (size_t row = 0; row < table.rows(); ++row) {
             EXPECT_GT(table.f[table.index(0, 6, row)], 0) << "order 6, pit at row " << at;
-            EXPECT_NEAR(sum.f[row], table.f[row], 1e-4 * sum.f[row] + sum.bias[row]) << "pit at row " << at;
+            // The mesh bias is corrected order by order, or once: each states what it leaves.
+            EXPECT_NEAR(sum.f[row], table.f[row],
+                        1e-4 * sum.f[row] + std::hypot(sum.bias[row], table.bias[row]))
+                << "pit at row " << at;
         }
     }
 }
