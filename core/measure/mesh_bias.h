@@ -26,7 +26,7 @@ struct MeshBias {
     std::vector<size_t> asked;          // entries of those that stand for pairs of the table
     bool all_pairs = false;             // they are the table's lights and views
     double guess = 0;                   // uncertainty without two grids
-    double guess_caution = 3;           // how many times larger what is guessed may be, to be let pass
+    double guess_caution = 1.4;         // times the guess must be below the target, to do without two grids
     double ratio = 0;                   // of one order to the one before, at albedo 1
 
     bool measured() const { return !exact.empty(); }

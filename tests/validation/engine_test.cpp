@@ -216,7 +216,7 @@ TEST(FastEngine, SphericalPits) {
         double largest_sigma;
     } cases[] = {{"pits_eta45_cov0p7", 288, {0.0015, 0.0075}, {1, 64, 1, 4}, 0.003},
                  {"pits_eta60_cov0p6", 288, {0.0015, 0.0075}, {1, 64, 1, 4}, 0.003},
-                 {"pits_hemisphere_cov0p5", 192, {0.02, 0.04}, {1, 256, 2, 4}, 0.006}};  // one-facet walls
+                 {"pits_hemisphere_cov0p5", 192, {0.02, 0.04}, {1, 256, 2, 4}, 0.003}};  // one-facet walls
     for (const auto& [name, n, tolerance, samples, largest_sigma] : cases) {
         const Case expected = reference::load_case(name);
         compare(expected, reference::surface(expected, n), samples, tolerance, largest_sigma);
