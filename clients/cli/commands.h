@@ -18,6 +18,8 @@ void add_measure(CLI::App& app, CommonOptions& common, Action& action);
 void add_batch(CLI::App& app, CommonOptions& common, Action& action);
 void add_info(CLI::App& app, CommonOptions& common, Action& action);
 void add_reference(CLI::App& app, CommonOptions& common, Action& action);
+void add_shard(CLI::App& app, CommonOptions& common, Action& action);
+void add_merge(CLI::App& app, CommonOptions& common, Action& action);
 void add_plot(CLI::App& app, CommonOptions& common, Action& action);
 void add_ndf(CLI::App& app, CommonOptions& common, Action& action);
 void add_schema(CLI::App& app, Action& action);

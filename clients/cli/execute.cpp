@@ -8,6 +8,7 @@
 #include "base/text.h"
 #include "clients/cli/console.h"
 #include "clients/cli/interrupt.h"
+#include "server/checkpoint_folder.h"
 #include "server/result_json.h"
 
 namespace gonio {
@@ -32,14 +33,19 @@ Job read_job(const std::string& path) {
 }
 
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
-                     const CommonOptions& common) {
+                     const CommonOptions& common, const ShardTask& task) {
     Monitor monitor;
     monitor.cancel_requested = &interrupt_requested();
     ProgressBar bar(common.quiet);
     monitor.on_progress = [&](const Progress& progress) { bar.update(progress); };
-    const BrdfResult result = run_job(loaded, common.run_options(), monitor);
+    CheckpointFolder checkpoints(common.checkpoints, loaded.hash);
+    RunOptions options = common.run_options();
+    options.shard_task = task;
+    if (!common.checkpoints.empty()) options.checkpoints = &checkpoints;
+    const BrdfResult result = run_job(loaded, options, monitor);
     monitor.check_cancelled();
     write_outputs(result.table, files);
+    if (!common.checkpoints.empty()) checkpoints.remove_all();
     return result.report;
 }
 

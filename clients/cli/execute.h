@@ -18,11 +18,14 @@ std::string read_text(const std::string& path);
 int execute_job(const Job& job, const CommonOptions& common,
                 const std::optional<ReferenceOptions>& reference = std::nullopt);
 
-// The part of it behind loading: runs with a progress bar and writes the outputs.
+// The part of it behind loading: runs with a progress bar and writes the outputs. task: which shards are
+// computed (measure/shards.h, which says what is thrown), --checkpoints is where the others are found.
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
-                     const CommonOptions& common);
+                     const CommonOptions& common, const ShardTask& task = {});
 
 // 1 failed, 2 wrong usage, 3 invalid input, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
 int exit_code(ErrorCode code);
+// Of `gonio shard` and `gonio merge`, which need other shards first.
+inline constexpr int shards_missing_exit_code = 7;
 
 }  // namespace gonio

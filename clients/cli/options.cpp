@@ -27,6 +27,8 @@ void add_run_options(CLI::App& command, CommonOptions& common) {
                     "Working memory in GiB; a job that cannot keep it is refused")
         ->check(CLI::Range(0.01, 1e6))
         ->capture_default_str();
+    command.add_option("--checkpoints", common.checkpoints,
+                       "Folder that keeps what is finished: the job goes on from there after a stop");
     command.add_flag("--no-skip", common.no_skip, "Do the work that the report would say was skipped");
     command.add_flag("--dry-run", common.dry_run,
                      "Read and check everything, print what would run, run nothing");

@@ -23,6 +23,7 @@ struct CommonOptions {
     int threads = 1;  // add_run_options sets the default: every hardware thread
     double max_memory_gib = 6;
     std::string folder = ".";  // of relative outputs
+    std::string checkpoints;   // folder where finished shards are kept; empty: nowhere
 
     RunOptions run_options() const;
 };

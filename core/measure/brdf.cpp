@@ -11,6 +11,7 @@
 #include "measure/describe.h"
 #include "measure/estimate.h"
 #include "measure/planning.h"
+#include "measure/shard_bytes.h"
 #include "measure/simplify.h"
 #include "measure/windows.h"
 #include "visibility/march.h"
@@ -28,6 +29,7 @@ class Measurement {
                 const BrdfPlan& plan, const RunOptions& options, const Monitor& monitor)
         : plan_(plan),
           options_(options),
+          shards_(options.checkpoints, options.shard_task),
           monitor_(monitor),
           scene_(simplify_scene(surface, material, options.allow_skips)),
           started_(std::chrono::steady_clock::now()) {
@@ -173,6 +175,7 @@ class Measurement {
 
     const BrdfPlan& plan_;
     RunOptions options_;
+    Shards shards_;
     const Monitor& monitor_;
     SimplifiedScene scene_;
     std::chrono::steady_clock::time_point started_;
@@ -195,8 +198,7 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
     const double bytes = std::min(run_bytes(context_, stage.settings, n_lights, n_views),
                                   static_cast<double>(context_.max_bytes));
     const int room = std::max(1, static_cast<int>(0.8 * static_cast<double>(options_.max_bytes) / bytes));
-    const int outer = std::min({options_.n_threads, n_runs, room}),
-              inner = std::max(1, options_.n_threads / outer);
+    const int outer = std::min({options_.n_threads, n_runs, room});
     const int first = stage.f.count();
     const bool transport = context_.indirect && context_.max_order != 1;
     // K g of all runs is kept where memory allows: else a side measurement tells the noise bias.
@@ -205,27 +207,43 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
                               std::pow(stage.settings.refinement, 2);
     context_.keep_first = transport && first == 0 && stage.settings.tiles_x == 0 &&
                           kept_bytes < 0.1 * static_cast<double>(options_.max_bytes);
-    if (transport && !stage.noise && !context_.keep_first)
-        stage.noise = measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_);
     std::vector<RunValues> runs(n_runs);
     int done = 0;
     const double began = seconds();
-    auto run = [&](int r, int n_threads) {
-        runs[r] = run_once(context_, stage.settings, stage.number, first + r, n_threads, monitor_);
+    auto run = [&](const Shards::Batch& batch, int offset, int position, int n_threads) {
+        RunValues& values = runs[offset + position];
+        values =
+            run_once(context_, stage.settings, stage.number, first + offset + position, n_threads, monitor_);
+        if (shards_.are_kept()) shards_.save(batch, position, to_bytes(values));
         const std::lock_guard lock(mutex_);
         ++done;
         monitor_.report({static_cast<double>(done) / n_runs,
                          "runs of stage " + std::to_string(stage.number + 1), result_.report.relative_error});
     };
+    auto run_batch = [&](int offset, int n) {
+        const Shards::Batch batch = shards_.take(n);
+        for (int k = 0; k < n; ++k)
+            if (batch.saved[k]) runs[offset + k] = run_values_from(*batch.saved[k]);
+        const int n_new = static_cast<int>(batch.to_compute.size()), side_by_side = std::min(outer, n_new);
+        done += n - n_new;
+        parallel_for(n_new, outer, [&](int k) {
+            run(batch, offset, batch.to_compute[k], std::max(1, options_.n_threads / side_by_side));
+        });
+        shards_.finish(batch);
+    };
     int alone = 0;
     if (plan_.separate_orders &&
         context_.single_orders == 0) {  // the first run tells how many orders all of them keep
-        run(alone++, options_.n_threads);
+        run_batch(alone++, 1);
         context_.fixed_applications = runs[0].applications;
         context_.single_orders = runs[0].higher_orders + 1;
     }
-    parallel_for(n_runs - alone, outer, [&](int r) { run(alone + r, inner); });
+    run_batch(alone, n_runs - alone);
     seconds_per_run_ = (seconds() - began) / n_runs * outer;
+    if (transport && !stage.noise && !context_.keep_first)
+        stage.noise = noise_bias_from(shards_.part("noise-" + std::to_string(stage.number), [&] {
+            return to_bytes(measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_));
+        }));
     if (context_.keep_first) {
         std::vector<const Fields*> first_orders;
         for (const RunValues& r : runs) first_orders.push_back(&r.first);
@@ -269,8 +287,10 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
         return;
     }
     const double albedo = scene_.material.is_map() ? 1.0 : albedo_range().second;
-    mesh_bias_ = measure_mesh_bias(context_, stages.back().settings, albedo * stages.back().ratio,
-                                   options_.n_threads, monitor_);
+    mesh_bias_ = mesh_bias_from(shards_.part("mesh-" + std::to_string(stages.back().number), [&] {
+        return to_bytes(measure_mesh_bias(context_, stages.back().settings, albedo * stages.back().ratio,
+                                          options_.n_threads, monitor_));
+    }));
 }
 
 // Whether the step ends before max_seconds; a step that would not is made smaller if that helps.
@@ -292,8 +312,8 @@ bool Measurement::ends_in_time(const Stage& stage, NextStep& step) const {
 void Measurement::measure() {
     const std::optional<Accuracy::Samples>& samples = plan_.accuracy.samples;
     const double wanted = target();
-    context_.max_bytes =
-        static_cast<long long>(0.8 * static_cast<double>(options_.max_bytes)) / options_.n_threads;
+    // Of one run: two fit side by side. A share by threads would cut a job differently on other machines.
+    context_.max_bytes = static_cast<long long>(0.4 * static_cast<double>(options_.max_bytes));
     std::vector<Stage> stages(1);
     if (samples) {
         stages[0].settings = {samples->sub_samples, samples->directions, samples->refinement, 0, 0};

@@ -13,7 +13,8 @@ namespace {
 std::string windows(const RunSettings& settings) {
     if (settings.tiles_x == 0) return "whole period";
     const std::string side = std::to_string(tile_core);
-    return std::to_string(settings.tiles_x * settings.tiles_y) + " a run of " + side + " x " + side + " cells";
+    return std::to_string(settings.tiles_x * settings.tiles_y) + " a run of " + side + " x " + side +
+           " cells";
 }
 
 std::string mesh_bias_in_words(const MeshBias& mesh_bias) {
@@ -32,7 +33,8 @@ double noise_correction_percent(const RunContext& context, const Stage& stage) {
 }
 
 int unresolved_directions(const RunContext& context, const Stage& stage) {
-    if (stage.settings.tiles_x > 0 || context.surface->border_x > 0 || context.surface->border_y > 0) return 0;
+    if (stage.settings.tiles_x > 0 || context.surface->border_x > 0 || context.surface->border_y > 0)
+        return 0;
     int n = 0;
     for (const Moments* projected : {&stage.projected_lights, &stage.projected_views})
         for (const double ratio : projected->mean()) n += unresolved_share(ratio) > 0;
@@ -52,20 +54,19 @@ void describe_runs(const RunContext& context, const std::vector<Stage>& stages, 
     const Stage& last = stages.back();
     int runs = 0;
     for (const Stage& s : stages) runs += s.f.count();
-    report.settings = {
-        {"transport", "diffuse operator"},
-        {"simd", simd_target()},
-        {"sub_samples", std::to_string(last.settings.sub_samples)},
-        {"directions", std::to_string(last.settings.directions)},
-        {"refinement", std::to_string(last.settings.refinement)},
-        {"applications", std::to_string(totals.applications)},
-        {"windows", windows(last.settings)},
-        {"runs", std::to_string(last.f.count()) + " (" + std::to_string(runs) + " in " +
-                     std::to_string(stages.size()) + " stages)"},
-        {"mesh_bias", mesh_bias_in_words(mesh_bias)},
-        {"noise_bias",
-         "corrected by " + number(noise_correction_percent(context, last)) + " % of the direct part"},
-        {"relative_error", number(report.relative_error)}};
+    report.settings = {{"transport", "diffuse operator"},
+                       {"simd", simd_target()},
+                       {"sub_samples", std::to_string(last.settings.sub_samples)},
+                       {"directions", std::to_string(last.settings.directions)},
+                       {"refinement", std::to_string(last.settings.refinement)},
+                       {"applications", std::to_string(totals.applications)},
+                       {"windows", windows(last.settings)},
+                       {"runs", std::to_string(last.f.count()) + " (" + std::to_string(runs) + " in " +
+                                    std::to_string(stages.size()) + " stages)"},
+                       {"mesh_bias", mesh_bias_in_words(mesh_bias)},
+                       {"noise_bias", "corrected by " + number(noise_correction_percent(context, last)) +
+                                          " % of the direct part"},
+                       {"relative_error", number(report.relative_error)}};
     report.counters = {{"rays", totals.rays},
                        {"rays skipped (steeper than the relief)", totals.rays_skipped},
                        {"links", totals.links},

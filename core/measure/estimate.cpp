@@ -118,8 +118,7 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                     const Noisy noisy = stage.noise ? noise_of(context, *stage.noise, stage.ratio, groups, c,
                                                                slice, r, direct, indirect, below)
                                                     : Noisy{};
-                    const double left_out =
-                        slice == 0 ? stage.remainder * (direct + 2 * indirect) : 0.0;
+                    const double left_out = slice == 0 ? stage.remainder * (direct + 2 * indirect) : 0.0;
                     const double skipped = slice == 0 ? skipped_bound * f : 0.0;
                     const int light = groups.light[r], view = context.view_to_light.empty()
                                                                   ? groups.view[r]

@@ -128,8 +128,8 @@ double MeshShare::uncertainty_of(int light, int view, double lowest_cos) const {
     // on the reliefs of tests/agreement/honest_surfaces.h, as shares of the rms over all pairs: 0.1 to 0.3
     // within 40 degrees, 0.1 to 1 at 60, 1.5 to 1.8 at 80.
     if (pairs.values.empty()) return uncertainty * (0.2 + 0.3 * (1 / std::max(lowest_cos, 0.1) - 1));
-    // Measured against much longer runs of refinement 4, on the reliefs of tests/agreement/honest_surfaces.h: 0.1
-    // to 0.2 of the correction is left, and up to half where it is small.
+    // Measured against much longer runs of refinement 4, on the reliefs of tests/agreement/honest_surfaces.h:
+    // 0.1 to 0.2 of the correction is left, and up to half where it is small.
     constexpr double left = 0.2;
     return left * std::hypot(pairs(light, view), typical);
 }
@@ -177,13 +177,14 @@ MeshBias predict_mesh_bias(const HeightField& surface) {
         }
     if (!(total > 0)) return {};
     const double squared_roughness = change / total,
-                 rms_slope = std::sqrt(total / (static_cast<double>((surface.ny + step - 1) / step) * surface.nx));
-    // rms over pairs of what two grids measure on Gaussian fields, slopes 0.3 to 3 and correlation lengths of 2
-    // to 12 cells, within 15 % (30 % at slope 0.3).
+                 rms_slope =
+                     std::sqrt(total / (static_cast<double>((surface.ny + step - 1) / step) * surface.nx));
+    // rms over pairs of what two grids measure on Gaussian fields, slopes 0.3 to 3 and correlation lengths of
+    // 2 to 12 cells, within 15 % (30 % at slope 0.3).
     MeshBias bias;
     bias.guess = 0.0225 * squared_roughness * rms_slope / std::sqrt(1 + rms_slope * rms_slope / 4);
-    // Facets that differ as much as they tilt do not resolve the relief. Most such fields follow the guess, too,
-    // but tiles with gaps of one cell had 3.7 times as much.
+    // Facets that differ as much as they tilt do not resolve the relief. Most such fields follow the guess,
+    // too, but tiles with gaps of one cell had 3.7 times as much.
     if (squared_roughness > 0.5) bias.guess_caution = 12;
     return bias;
 }

@@ -36,8 +36,8 @@ struct MeshBias {
 };
 
 // Guess from how much neighbouring facets differ in tilt and from the slope, calibrated on two-grid runs of
-// Gaussian fields: at slope 0.7 0.1 % (correlation length 8 cells) to 1.4 % (2 cells) of the indirect part. No
-// run.
+// Gaussian fields: at slope 0.7 0.1 % (correlation length 8 cells) to 1.4 % (2 cells) of the indirect part.
+// No run.
 MeshBias predict_mesh_bias(const HeightField& surface);
 
 // Whether the relief is such as the guess was calibrated on: not if it has few facets, or facets much taller

@@ -6,6 +6,7 @@
 
 #include "directions/direction.h"
 #include "material/material.h"
+#include "measure/shards.h"
 #include "surface/height_field.h"
 
 namespace gonio {
@@ -35,8 +36,11 @@ struct BrdfPlan {
 
 struct RunOptions {
     int n_threads = 1;
-    bool allow_skips = true;          // --no-skip: do the work that the report would say was skipped
-    long long max_bytes = 6LL << 30;  // working memory
+    bool allow_skips = true;  // --no-skip: do the work that the report would say was skipped
+    long long max_bytes =
+        6LL << 30;  // working memory; decides how a large job is cut, so the same everywhere
+    Checkpoints* checkpoints = nullptr;  // where finished shards are kept, if anywhere
+    ShardTask shard_task = {};
 };
 
 }  // namespace gonio

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/parallel.h"
+#include "measure/shard_bytes.h"
 #include "scattering/path_tracer.h"
 
 namespace gonio {
@@ -90,50 +91,63 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
         {reference.paths, plan.max_order, table.orders, plan.accuracy.seed, options.allow_skips});
     const double built = cpu_seconds();
 
+    const double scale = tracer.scale();
+    RayCounts rays;
+    const std::vector<View> views = group_by_view(table);
+    auto write_view = [&](const View& view, const PathTally& total) {
+        rays += total.rays;
+        for (size_t l = 0; l < view.rows.size(); ++l)
+            for (size_t slice = 0; slice < n_slices; ++slice)
+                for (size_t c = 0; c < n_channels; ++c) {
+                    const size_t from = (l * n_slices + slice) * n_channels + c;
+                    const size_t to = table.index(c, slice, view.rows[l]);
+                    table.f[to] = static_cast<float>(scale * total.sum[from]);
+                    table.se[to] = static_cast<float>(scale * std::sqrt(total.squared_spread[from]));
+                }
+    };
+    // A view is a shard.
+    Shards shards(options.checkpoints, options.shard_task);
+    const Shards::Batch batch = shards.take(static_cast<int>(views.size()));
+    for (size_t v = 0; v < views.size(); ++v)
+        if (batch.saved[v]) write_view(views[v], path_tally_from(*batch.saved[v]));
+
     // Work in waves of (view, block) tasks, small enough for the memory and for frequent progress. The sums
     // are added in the order of the tasks, so neither the size of a wave nor the number of threads shows in
     // the bits.
-    const std::vector<View> views = group_by_view(table);
     size_t most_lights = 1;
     for (const View& view : views) most_lights = std::max(most_lights, view.lights.size());
     const long long tally_bytes = static_cast<long long>(most_lights * n_values * 2 * sizeof(double));
     const long long by_memory = std::max(1LL, (options.max_bytes - scene_bytes) / 4 / tally_bytes);
-    const long long blocks = tracer.blocks(), n_tasks = blocks * static_cast<long long>(views.size());
+    const long long blocks = tracer.blocks(),
+                    n_tasks = blocks * static_cast<long long>(batch.to_compute.size());
     const long long wave = std::min<long long>(by_memory, 4LL * std::max(1, options.n_threads));
-    const double scale = tracer.scale();
-    RayCounts rays;
     PathTally total;
     std::vector<PathTally> tallies(std::min(wave, n_tasks));
     for (long long first = 0; first < n_tasks; first += wave) {
         monitor.report({static_cast<double>(first) / static_cast<double>(n_tasks), "path tracing", 0});
         const int n = static_cast<int>(std::min(wave, n_tasks - first));
         parallel_for(n, options.n_threads, [&](int k) {
-            const View& view = views[(first + k) / blocks];
+            const View& view = views[batch.to_compute[(first + k) / blocks]];
             tallies[k] = tracer.trace(view.outgoing, to_vector(table.outgoing[view.outgoing]), view.lights,
                                       static_cast<int>((first + k) % blocks), monitor);
         });
         for (int k = 0; k < n; ++k) {
-            rays += tallies[k].rays;
             if ((first + k) % blocks == 0) {
                 total = std::move(tallies[k]);
             } else {
+                total.rays += tallies[k].rays;
                 for (size_t m = 0; m < total.sum.size(); ++m) {
                     total.sum[m] += tallies[k].sum[m];
                     total.squared_spread[m] += tallies[k].squared_spread[m];
                 }
             }
             if ((first + k) % blocks != blocks - 1) continue;
-            const View& view = views[(first + k) / blocks];
-            for (size_t l = 0; l < view.rows.size(); ++l)
-                for (size_t slice = 0; slice < n_slices; ++slice)
-                    for (size_t c = 0; c < n_channels; ++c) {
-                        const size_t from = (l * n_slices + slice) * n_channels + c;
-                        const size_t to = table.index(c, slice, view.rows[l]);
-                        table.f[to] = static_cast<float>(scale * total.sum[from]);
-                        table.se[to] = static_cast<float>(scale * std::sqrt(total.squared_spread[from]));
-                    }
+            const int v = batch.to_compute[(first + k) / blocks];
+            if (shards.are_kept()) shards.save(batch, v, to_bytes(total));
+            write_view(views[v], total);
         }
     }
+    shards.finish(batch);
     monitor.report({1, "path tracing", 0});
 
     Report& report = result.report;

@@ -146,7 +146,8 @@ struct Sums {
                 add_matrix(sum, indirect[channel++]);
             }
             orders[s].resize(std::max(orders[s].size(), series[s].orders.size()));
-            for (size_t k = 0; k < series[s].orders.size(); ++k) add_matrix(series[s].orders[k], orders[s][k]);
+            for (size_t k = 0; k < series[s].orders.size(); ++k)
+                add_matrix(series[s].orders[k], orders[s][k]);
         }
         add_vector(irradiance.projected_lights, projected_lights);
         add_vector(irradiance.projected_views, projected_views);

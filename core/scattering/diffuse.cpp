@@ -72,8 +72,8 @@ class Decline {
         const double x = albedo * ratio_;
         // <g, K^zeros g>, or the even power below.
         const size_t half = std::min<size_t>(norms_.size() - 1, weighed.zeros / 2);
-        // rms of a residual that oscillates. Measured at slopes 0.3 to 1.5 and in a deep groove, the error is 0.05
-        // to 0.9 of the bound (0.8 to 0.9 where the residual keeps its sign).
+        // rms of a residual that oscillates. Measured at slopes 0.3 to 1.5 and in a deep groove, the error is
+        // 0.05 to 0.9 of the bound (0.8 to 0.9 where the residual keeps its sign).
         const double typical = n_orders + 1 - weighed.zeros > 1 ? std::sqrt(0.5) : 1.0;
         return typical * std::pow(albedo, 2.0 * static_cast<double>(half)) * norms_[half] / norms_[0] /
                (1 - x) * weighed.largest;

@@ -1,6 +1,7 @@
 // Values per unknown for a batch of directions, and their inner products.
 #pragma once
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 #include "base/huge_pages.h"
@@ -21,6 +22,9 @@ class Fields {
           n_columns_(n_columns),
           values_(static_cast<size_t>((n_columns + column_block - 1) / column_block) * n_unknowns *
                   column_block) {}
+    // values: as values() of such fields.
+    Fields(size_t n_unknowns, int n_columns, HugeFloats values)
+        : n_unknowns_(n_unknowns), n_columns_(n_columns), values_(std::move(values)) {}
     size_t n_unknowns() const { return n_unknowns_; }
     int n_columns() const { return n_columns_; }
     int n_blocks() const { return static_cast<int>(values_.size() / (n_unknowns_ * column_block)); }
@@ -66,8 +70,8 @@ void add_products(const Tile& tile, const Combination& a, const Combination& b, 
 // does not tell apart.
 void average_parts(const Tile& tile, int coarse_refinement, int n_threads, Fields& fields);
 
-// Estimate of the sum over all values of a * b from every eighth run of 16 unknowns (all of a small surface), in a fixed order:
-// enough to judge a series.
+// Estimate of the sum over all values of a * b from every eighth run of 16 unknowns (all of a small surface),
+// in a fixed order: enough to judge a series.
 double sampled_inner_product(const Fields& a, const Fields& b);
 
 }  // namespace gonio

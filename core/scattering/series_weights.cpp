@@ -23,7 +23,8 @@ SeriesWeights series_weights(int n_orders, double bound) {
     // In powers of x, T_m has coefficients up to (1 + sqrt 2)^m: rounding is magnified by no more than this.
     constexpr double most_magnified = 100;
     int m = n_orders - 1;
-    while (m > 0 && std::pow(1 + std::sqrt(2.0), m) > most_magnified * chebyshev_beyond_one(m, 1 / bound)) --m;
+    while (m > 0 && std::pow(1 + std::sqrt(2.0), m) > most_magnified * chebyshev_beyond_one(m, 1 / bound))
+        --m;
     weights.zeros = n_orders + 1 - m;
     weights.largest = 1 / chebyshev_beyond_one(m, 1 / bound);
 

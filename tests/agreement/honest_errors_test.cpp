@@ -134,7 +134,8 @@ void expect_honest(const std::vector<std::pair<std::string, Coverage>>& parts, d
     EXPECT_GT(all.entries, 5000);
     const double normal[] = {68.3, 95.4, 99.7};
     for (int k = 0; k < 3; ++k)
-        EXPECT_NEAR(all.percent(k), normal[k], 5) << "within " << k + 1 << " sigma, target " << target << text;
+        EXPECT_NEAR(all.percent(k), normal[k], 5)
+            << "within " << k + 1 << " sigma, target " << target << text;
     std::printf("target %g: %s%s\n", target, all.text().c_str(), text.c_str());
 }
 

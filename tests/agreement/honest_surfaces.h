@@ -13,8 +13,8 @@ namespace gonio::honest {
 
 struct Relief {
     const char* name;
-    // The guess of the mesh bias and what its correction leaves (measure/mesh_bias.cpp) were measured on these;
-    // the others were made afterwards, to judge them.
+    // The guess of the mesh bias and what its correction leaves (measure/mesh_bias.cpp) were measured on
+    // these; the others were made afterwards, to judge them.
     bool seen_before;
     HeightField (*make)();
 };

@@ -18,7 +18,7 @@ import unittest
 GONIO = os.path.abspath(sys.argv.pop(1))
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
 LAVA = str(SOURCE / "tests/samples/lava_rock_256_16bit.png")
-COMMANDS = ["measure", "run", "batch", "info", "reference", "plot", "ndf", "schema"]
+COMMANDS = ["measure", "run", "batch", "info", "reference", "shard", "merge", "plot", "ndf", "schema"]
 
 # A flat plane is answered exactly and at once; a V-groove needs the engine.
 PLANE = {"generate": "plane", "samples": 2, "pitch": "1 mm"}
@@ -432,6 +432,78 @@ class Others(Program):
         self.assertNotIn("\x1b[1;31m", text)
         text = self.on_terminal({"TERM": "dumb"})
         self.assertNotIn("\x1b", text)
+
+
+class Shards(Program):
+    def setUp(self):
+        super().setUp()
+        surface = {"generate": "gaussian", "samples": 64, "pitch": "1 um", "correlation_length": "2 um", "rms_slope": 1}
+        hemisphere = {"hemisphere": 64}
+        document = job(surface, 0.8, measure={"kind": "brdf", "incident": hemisphere, "outgoing": hemisphere},
+                       accuracy={"target_relative_error": 0.003}, output=[{"format": "csv", "path": "a.csv"}])
+        (self.folder / "a.json").write_text(json.dumps(document))
+
+    def whole(self):
+        self.gonio("run", "a.json", "-o", "whole")
+        return (self.folder / "whole/a.csv").read_bytes()
+
+    def test_shards_merge_to_the_bytes_of_one_run(self):
+        rounds = 0
+        while True:
+            merge = subprocess.run([GONIO, "merge", "a.json", "--checkpoints", "work", "-o", "merged", "-q"],
+                                   cwd=self.folder, capture_output=True, text=True, timeout=300)
+            if merge.returncode == 0:
+                break
+            self.assertEqual(merge.returncode, 7, merge.stderr)
+            self.assertFalse((self.folder / "merged").exists())
+            rounds += 1
+            for index in reversed(merge.stdout.split()):
+                self.gonio("shard", "--job", "a.json", "--index", index, "--checkpoints", "work", "-q")
+        self.assertGreaterEqual(rounds, 1)
+        self.assertEqual((self.folder / "merged/a.csv").read_bytes(), self.whole())
+        self.assertEqual(list((self.folder / "work").iterdir()), [], "shards are kept after the merge")
+
+    def test_shards_out_of_order_are_refused(self):
+        result = self.gonio("shard", "--job", "a.json", "--index", 6, "--checkpoints", "work", code=7)
+        self.assertIn("0 1 2 3 4 5", result.stderr)
+        self.gonio("shard", "--job", "a.json", "--index", 0, code=2)
+
+    def test_reference_in_shards(self):
+        (self.folder / "b.json").write_text(json.dumps(job(GROOVE, output=[{"format": "csv", "path": "b.csv"}])))
+        arguments = ["--reference", 512, "--checkpoints", "work", "-q"]
+        self.assertEqual(self.gonio("merge", "b.json", *arguments, code=7).stdout.split(), ["0", "1", "2", "3"])
+        for index in range(4):
+            self.gonio("shard", "--job", "b.json", "--index", index, *arguments)
+        self.gonio("merge", "b.json", *arguments)
+        self.gonio("reference", "b.json", "--paths", 512, "-o", "whole")
+        self.assertEqual((self.folder / "b.reference.csv").read_bytes(),
+                         (self.folder / "whole/b.reference.csv").read_bytes())
+
+    def test_kill_9_costs_at_most_what_was_running(self):
+        arguments = [GONIO, "run", "a.json", "-o", "resumed", "--checkpoints", "work", "--threads", "1", "-q"]
+        kills, delay = 0, 0.2
+        while True:
+            process = subprocess.Popen(arguments, cwd=self.folder)
+            try:
+                self.assertEqual(process.wait(delay), 0)
+                break
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+                kills += 1
+                delay = min(1.3 * delay, 60)  # so that each run of the engine fits in sooner or later
+                self.assertFalse((self.folder / "resumed/a.csv").exists())
+        self.assertGreater(kills, 0)
+        self.assertEqual((self.folder / "resumed/a.csv").read_bytes(), self.whole())
+
+    def test_damaged_shards_are_computed_again(self):
+        self.gonio("shard", "--job", "a.json", "--index", 2, "--checkpoints", "work")
+        shard = next((self.folder / "work").rglob("shard-2"))
+        data = bytearray(shard.read_bytes())
+        data[len(data) // 2] ^= 1
+        shard.write_bytes(data)
+        self.gonio("run", "a.json", "-o", "again", "--checkpoints", "work")
+        self.assertEqual((self.folder / "again/a.csv").read_bytes(), self.whole())
 
 
 if __name__ == "__main__":
