@@ -95,11 +95,6 @@ Objects::Objects(const std::string& folder) : folder_(folder) {
     const std::string objects = folder + "/objects", temporaries = folder + "/tmp";
     make_folder(objects);
     make_folder(temporaries);
-    // All 256 at once: a folder made when its first object comes would have to be made durable then, by
-    // whichever of the writers came first, while the others wait.
-    for (int k = 0; k < 256; ++k)
-        make_folder(objects + "/" + "0123456789abcdef"[k >> 4] + "0123456789abcdef"[k & 15]);
-    sync_folder_or_die(objects);
     sync_folder_or_die(folder);
     for (const fs::directory_entry& leftover : fs::directory_iterator(temporaries)) {
         std::error_code failure;  // what cannot be removed now is met again at the next start
@@ -153,8 +148,18 @@ std::shared_ptr<const void> Objects::hold(const std::string& sha256) {
             }};
 }
 
+void Objects::ensure_folder(const std::string& folder) {
+    const std::lock_guard lock(folders_mutex_);
+    if (durable_folders_.contains(folder)) return;
+    // Synced even if it was there: the process that made it may have died before.
+    make_folder(folder);
+    sync_folder_or_die(folder_ + "/objects");
+    durable_folders_.insert(folder);
+}
+
 void Objects::place(const std::string& temporary, const std::string& sha256, int64_t bytes) {
     const std::string target = path(sha256);
+    ensure_folder(folder_of(sha256));
     // Renaming makes whatever has the name whole; the size is asked for as well so that an object that was
     // damaged by other means is mended when it comes again. The mutant goes without both.
     if (mutant("no_rename") ? exists(sha256) : size(sha256) == bytes) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "base/sha256.h"
 #include "server/store/files.h"
@@ -75,7 +76,11 @@ class Objects {
     std::shared_ptr<const void> hold(const std::string& sha256);
     void place(const std::string& temporary, const std::string& sha256, int64_t bytes);
 
+    void ensure_folder(const std::string& folder);
+
     std::string folder_;
+    std::mutex folders_mutex_;  // held during the sync: who comes second must not be ahead of it
+    std::unordered_set<std::string> durable_folders_;
     // Who will refer to an object pins it before looking whether it is there; who removes looks at the pins and
     // removes under the mutex. Shared, because a pin may outlive the store.
     struct Pins {
