@@ -62,12 +62,14 @@ def cut_once(program, root, chance, promises, first, env):
     """Runs the driver, cuts the power at some instant; what is wrong on the disk that remains."""
     disk, copy, seen = root / "xfs/disk.img", root / "xfs/copy.img", root / "seen"
     driver = Driver(program, root / "live/data", "both", first, 400, promises=promises, env=env)
-    time.sleep(chance.uniform(0.05, 0.5))
-    # Said strictly before the cut: dictionaries are copied first.
-    acknowledged, done = dict(promises.acknowledged), dict(promises.done)
-    command("cp", "--reflink=always", disk, copy)
-    driver.process.kill()
-    driver.wait()
+    try:
+        time.sleep(chance.uniform(0.05, 0.5))
+        # Said strictly before the cut: dictionaries are copied first.
+        acknowledged, done = dict(promises.acknowledged), dict(promises.done)
+        command("cp", "--reflink=always", disk, copy)
+    finally:
+        driver.process.kill()
+        driver.wait()
     with mounted(copy, seen):
         # Before the first promise there may not even be tables.
         faults = judge(seen / "data", acknowledged, done) if acknowledged else []
