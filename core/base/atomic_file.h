@@ -6,8 +6,8 @@
 
 namespace gonio {
 
-// Writes `path` aside (same folder), fsyncs it, renames it, fsyncs the folder; removes the temporary if `write`
-// throws.
+// Writes `path` aside (same folder), fsyncs it, renames it, fsyncs the folder; removes the temporary if
+// `write` throws.
 void write_file_atomically(const std::string& path, const std::function<void(std::ostream&)>& write);
 // The same for libraries that want a file name: `write` gets the temporary's path.
 void write_path_atomically(const std::string& path,

@@ -13,16 +13,18 @@ std::string random_id() {
     std::random_device device;  // the kernel's random numbers: nobody guesses another's job
     std::string id;
     for (int word = 0; word < 4; ++word)
-        for (unsigned bits = device(), digit = 0; digit < 8; ++digit, bits >>= 4) id += "0123456789abcdef"[bits & 15];
+        for (unsigned bits = device(), digit = 0; digit < 8; ++digit, bits >>= 4)
+            id += "0123456789abcdef"[bits & 15];
     return id;
 }
 
 bool is_file_name(const std::string& name) {
     return !name.empty() && name.size() <= 128 && name[0] != '.' &&
-           std::all_of(name.begin(), name.end(), [](unsigned char c) {
-               return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' ||
-                      c == '_' || c == '-';
-           }) &&
+           std::all_of(name.begin(), name.end(),
+                       [](unsigned char c) {
+                           return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') ||
+                                  (c >= 'A' && c <= 'Z') || c == '.' || c == '_' || c == '-';
+                       }) &&
            name != "document.json" && name != "SHA256SUMS";  // what an export adds
 }
 
@@ -43,7 +45,8 @@ void dismiss_stopped(Database& database, const std::string& job_hash, int64_t at
     drop_unneeded_checkpoints(database, job_hash);
 }
 
-// Ends every unfinished job of the hash. One that was told to stop is dismissed, however its computation ended.
+// Ends every unfinished job of the hash. One that was told to stop is dismissed, however its computation
+// ended.
 void end_jobs(Database& database, const std::string& job_hash, JobStatus status, const std::string& message,
               const std::optional<std::string>& problem, int64_t at) {
     dismiss_stopped(database, job_hash, at);
@@ -51,8 +54,8 @@ void end_jobs(Database& database, const std::string& job_hash, JobStatus status,
               "UPDATE jobs SET status=?, message=?, problem=?, progress=iif(?, 100, progress), "
               "started=coalesce(started, ?), finished=?, updated=?, version=version+1 "
               "WHERE job_hash=? AND status IN ('accepted', 'running')",
-              std::string(status_name(status)), message, problem, int{status == JobStatus::successful}, at, at,
-              at, job_hash)
+              std::string(status_name(status)), message, problem, int{status == JobStatus::successful}, at,
+              at, at, job_hash)
         .run();
     drop_checkpoints(database, job_hash);
 }
@@ -60,14 +63,16 @@ void end_jobs(Database& database, const std::string& job_hash, JobStatus status,
 std::string problem_of_deaths(int attempts) {
     return "{\"type\":\"about:blank\",\"title\":\"The computation ended the service\",\"status\":500,"
            "\"detail\":\"" +
-           std::to_string(attempts) + " attempts to compute this job ended with the death of the process; it is not tried again\"}";
+           std::to_string(attempts) +
+           " attempts to compute this job ended with the death of the process; it is not tried again\"}";
 }
 
 // The oldest equal job goes on with the computation of a dismissed one; false if there is none.
 bool hand_over(Database& database, const StoredJob& from, int64_t at) {
     Statement(database,
               "UPDATE jobs SET status='running', started=?, attempts=?, progress=?, message=?, updated=?, "
-              "version=version+1 WHERE sequence=(SELECT min(sequence) FROM jobs WHERE job_hash=? AND status='accepted')",
+              "version=version+1 WHERE sequence=(SELECT min(sequence) FROM jobs WHERE job_hash=? AND "
+              "status='accepted')",
               at, from.attempts, from.progress, from.message, at, from.job_hash)
         .run();
     return database.changed_rows() > 0;
@@ -80,7 +85,8 @@ Acceptance Store::accept(const NewJob& job) {
     const int64_t at = now();
     return writer_.run([&](Database& database) -> Acceptance {
         if (job.idempotency_key) {
-            Statement earlier(database, "SELECT id, request_hash FROM jobs WHERE owner=? AND idempotency_key=?",
+            Statement earlier(database,
+                              "SELECT id, request_hash FROM jobs WHERE owner=? AND idempotency_key=?",
                               job.owner, *job.idempotency_key);
             if (earlier.step())
                 return {earlier.text(1) == job.request_hash ? Acceptance::Outcome::repeated
@@ -89,11 +95,12 @@ Acceptance Store::accept(const NewJob& job) {
         }
         Statement(database, "UPDATE results SET last_used=? WHERE job_hash=?", at, job.job_hash).run();
         const bool known = database.changed_rows() > 0;
-        Statement(database,
-                  "INSERT INTO jobs(id, process, document, job_hash, status, message, created, updated, owner, "
-                  "idempotency_key, request_hash) VALUES(?,?,?,?,'accepted',?,?,?,?,?,?)",
-                  id, job.process, job.document, job.job_hash, job.message, at, at, job.owner, job.idempotency_key,
-                  job.request_hash)
+        Statement(
+            database,
+            "INSERT INTO jobs(id, process, document, job_hash, status, message, created, updated, owner, "
+            "idempotency_key, request_hash) VALUES(?,?,?,?,'accepted',?,?,?,?,?,?)",
+            id, job.process, job.document, job.job_hash, job.message, at, at, job.owner, job.idempotency_key,
+            job.request_hash)
             .run();
         if (known) end_jobs(database, job.job_hash, JobStatus::successful, job.message, {}, at);
         const StoredJob stored = *find_job(database, id);
@@ -101,7 +108,8 @@ Acceptance Store::accept(const NewJob& job) {
             Statement(database, "UPDATE surfaces SET last_used=? WHERE sha256=?", at, sha256).run();
             if (database.changed_rows() == 0)
                 throw Error(ErrorCode::not_found, "surface", sha256, "is not in the store");
-            Statement(database, "INSERT OR IGNORE INTO job_surfaces VALUES(?,?)", stored.sequence, sha256).run();
+            Statement(database, "INSERT OR IGNORE INTO job_surfaces VALUES(?,?)", stored.sequence, sha256)
+                .run();
         }
         return {Acceptance::Outcome::created, stored};
     });
@@ -182,7 +190,8 @@ Dismissal Store::dismiss(const std::string& id) {
     return writer_.run([&](Database& database) {
         const std::optional<StoredJob> job = find_job(database, id);
         if (!job) return Dismissal::not_found;
-        if (job->status != JobStatus::accepted && job->status != JobStatus::running) return Dismissal::finished;
+        if (job->status != JobStatus::accepted && job->status != JobStatus::running)
+            return Dismissal::finished;
         const bool running = job->status == JobStatus::running;
         if (running && (job->stop_requested || !hand_over(database, *job, at))) {
             Statement(database,
@@ -193,8 +202,8 @@ Dismissal Store::dismiss(const std::string& id) {
             return Dismissal::stopping;
         }
         Statement(database,
-                  "UPDATE jobs SET status='dismissed', finished=?, updated=?, version=version+1 WHERE id=?", at,
-                  at, id)
+                  "UPDATE jobs SET status='dismissed', finished=?, updated=?, version=version+1 WHERE id=?",
+                  at, at, id)
             .run();
         drop_unneeded_checkpoints(database, job->job_hash);
         return Dismissal::dismissed;
@@ -203,8 +212,8 @@ Dismissal Store::dismiss(const std::string& id) {
 
 void Store::save_checkpoint(const std::string& job_hash, const std::string& key, const StoredObject& object) {
     writer_.run([&](Database& database) {
-        Statement(database, "INSERT OR REPLACE INTO checkpoints VALUES(?,?,?,?)", job_hash, key, object.sha256,
-                  object.bytes)
+        Statement(database, "INSERT OR REPLACE INTO checkpoints VALUES(?,?,?,?)", job_hash, key,
+                  object.sha256, object.bytes)
             .run();
         return true;
     });
@@ -214,7 +223,8 @@ void Store::put_surface(const StoredObject& object) {
     const int64_t at = now();
     writer_.run([&](Database& database) {
         Statement(database,
-                  "INSERT INTO surfaces VALUES(?,?,?,?) ON CONFLICT(sha256) DO UPDATE SET last_used=excluded.last_used",
+                  "INSERT INTO surfaces VALUES(?,?,?,?) ON CONFLICT(sha256) DO UPDATE SET "
+                  "last_used=excluded.last_used",
                   object.sha256, object.bytes, at, at)
             .run();
         return true;
@@ -238,7 +248,8 @@ void Store::recover(int max_attempts) {
                          problem_of_deaths(job.attempts), at);
             } else {
                 Statement(database,
-                          "UPDATE jobs SET status='accepted', started=NULL, updated=?, version=version+1 WHERE id=?",
+                          "UPDATE jobs SET status='accepted', started=NULL, updated=?, version=version+1 "
+                          "WHERE id=?",
                           at, job.id)
                     .run();
             }

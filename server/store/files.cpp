@@ -40,7 +40,9 @@ int FileDescriptor::release() {
 }
 
 void die_of_lost_sync(const std::string& path, const std::string& reason) {
-    std::fprintf(stderr, "gonio: %s: cannot be synced to the disk (%s); stopping, so that nothing is promised that may be lost\n",
+    std::fprintf(stderr,
+                 "gonio: %s: cannot be synced to the disk (%s); stopping, so that nothing is promised that "
+                 "may be lost\n",
                  path.c_str(), reason.c_str());
     std::abort();
 }

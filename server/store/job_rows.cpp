@@ -7,7 +7,8 @@
 namespace gonio {
 namespace {
 
-constexpr std::array<std::string_view, 5> names = {"accepted", "running", "successful", "failed", "dismissed"};
+constexpr std::array<std::string_view, 5> names = {"accepted", "running", "successful", "failed",
+                                                   "dismissed"};
 
 }  // namespace
 
@@ -23,7 +24,8 @@ JobStatus status_named(std::string_view name) {
 }
 
 std::string select_jobs(const std::string& rest) {
-    return "SELECT sequence, id, process, job_hash, owner, status, message, progress, created, started, finished, "
+    return "SELECT sequence, id, process, job_hash, owner, status, message, progress, created, started, "
+           "finished, "
            "updated, expires, version, attempts, stop_requested, problem FROM jobs " +
            rest;
 }
@@ -56,7 +58,8 @@ std::optional<StoredJob> find_job(Database& database, const std::string& id) {
 }
 
 bool has_unfinished_job(Database& database, const std::string& job_hash) {
-    Statement row(database, "SELECT 1 FROM jobs WHERE job_hash=? AND status IN ('accepted', 'running') LIMIT 1",
+    Statement row(database,
+                  "SELECT 1 FROM jobs WHERE job_hash=? AND status IN ('accepted', 'running') LIMIT 1",
                   job_hash);
     return row.step();
 }

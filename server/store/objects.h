@@ -1,5 +1,5 @@
-// Files named after the SHA-256 of what is in them: FOLDER/objects/ab/abcd.... Whoever finds an object under its
-// name finds all of it, after a power cut too.
+// Files named after the SHA-256 of what is in them: FOLDER/objects/ab/abcd.... Whoever finds an object under
+// its name finds all of it, after a power cut too.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -81,8 +81,8 @@ class Objects {
     std::string folder_;
     std::mutex folders_mutex_;  // held during the sync: who comes second must not be ahead of it
     std::unordered_set<std::string> durable_folders_;
-    // Who will refer to an object pins it before looking whether it is there; who removes looks at the pins and
-    // removes under the mutex. Shared, because a pin may outlive the store.
+    // Who will refer to an object pins it before looking whether it is there; who removes looks at the pins
+    // and removes under the mutex. Shared, because a pin may outlive the store.
     struct Pins {
         std::mutex mutex;
         std::unordered_map<std::string, int> count;

@@ -19,10 +19,10 @@ std::string_view status_name(JobStatus status);
 JobStatus status_named(std::string_view name);
 
 struct NewJob {
-    std::string process;   // "brdf"
-    std::string document;  // the canonical job, as accepted
-    std::string job_hash;  // equal hash: equal result, computed once
-    std::string owner;     // name of the token; may be empty
+    std::string process;                         // "brdf"
+    std::string document;                        // the canonical job, as accepted
+    std::string job_hash;                        // equal hash: equal result, computed once
+    std::string owner;                           // name of the token; may be empty
     std::optional<std::string> idempotency_key;  // unique per owner
     std::string request_hash;                    // of the request that came with the key
     std::vector<std::string> surfaces;           // SHA-256 of the surfaces that it reads
@@ -87,8 +87,9 @@ struct Checkpoint {
 struct JobFilter {
     std::vector<JobStatus> statuses;  // empty: any
     std::optional<std::string> process, owner;
-    std::optional<int64_t> created_from, created_to;            // both ends included
-    std::optional<int64_t> min_duration_ms, max_duration_ms;    // of jobs that were started; running ones: so far
+    std::optional<int64_t> created_from, created_to;  // both ends included
+    std::optional<int64_t> min_duration_ms,
+        max_duration_ms;  // of jobs that were started; running ones: so far
     int64_t limit = 10;
     std::optional<int64_t> after;  // sequence of the last job of the page before
 };
@@ -109,8 +110,8 @@ struct GcReport {
 };
 
 struct StoreCheck {
-    std::vector<std::string> faults;  // empty: all is well
-    int64_t rows = 0;                 // that point to objects
+    std::vector<std::string> faults;   // empty: all is well
+    int64_t rows = 0;                  // that point to objects
     int64_t objects = 0, orphans = 0;  // an orphan, to which no row points, is no fault
 };
 

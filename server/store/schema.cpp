@@ -87,8 +87,8 @@ void migrate(Database& database) {
     int64_t version = version_of(database);
     if (version > known)
         throw Error(ErrorCode::io, database.path(), "",
-                    "was written by a newer gonio (version " + std::to_string(version) + " of the tables; this one knows " +
-                        std::to_string(known) + ")");
+                    "was written by a newer gonio (version " + std::to_string(version) +
+                        " of the tables; this one knows " + std::to_string(known) + ")");
     for (; version < known; ++version) {
         database.execute("BEGIN IMMEDIATE");
         try {

@@ -37,9 +37,11 @@ Database::Database(const std::string& path, Access access) : path_(path) {
 
 void Database::open(Access access) {
     // NOMUTEX: a connection is used by one thread at a time; this saves a lock per call.
-    const int flags = SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE |
-                      (access == Access::write ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
-    if (const int code = sqlite3_open_v2(path_.c_str(), &handle_, flags, nullptr)) fail(code, "cannot be opened");
+    const int flags =
+        SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE |
+        (access == Access::write ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY);
+    if (const int code = sqlite3_open_v2(path_.c_str(), &handle_, flags, nullptr))
+        fail(code, "cannot be opened");
     sqlite3_busy_timeout(handle_, busy_ms);
     execute("PRAGMA foreign_keys=ON");
     if (access == Access::read) return;
@@ -49,7 +51,8 @@ void Database::open(Access access) {
     // The checkpoint at closing drops its errors as well, and the log is as good a place as the database.
     sqlite3_db_config(handle_, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
     sqlite3_wal_hook(
-        handle_, [](void* log_pages, sqlite3*, const char*, int pages) {
+        handle_,
+        [](void* log_pages, sqlite3*, const char*, int pages) {
             *static_cast<int*>(log_pages) = pages;
             return SQLITE_OK;
         },
@@ -94,8 +97,8 @@ void Database::checkpoint_if_above(int pages) {
 }
 
 Statement::Statement(Database& database, std::string_view sql, Prepare) : database_(database) {
-    if (const int code = sqlite3_prepare_v2(database.handle_, sql.data(), static_cast<int>(sql.size()), &handle_,
-                                            nullptr))
+    if (const int code =
+            sqlite3_prepare_v2(database.handle_, sql.data(), static_cast<int>(sql.size()), &handle_, nullptr))
         database_.fail(code, "cannot be asked");
 }
 
@@ -130,7 +133,8 @@ bool Statement::step() {
 
 std::string Statement::text(int column) const {
     const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(handle_, column));
-    return data ? std::string(data, static_cast<size_t>(sqlite3_column_bytes(handle_, column))) : std::string();
+    return data ? std::string(data, static_cast<size_t>(sqlite3_column_bytes(handle_, column)))
+                : std::string();
 }
 
 int64_t Statement::integer(int column) const {

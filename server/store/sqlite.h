@@ -20,7 +20,8 @@ class Database {
     // Tried again for up to 10 s: while another connection recovers the log of a crashed process, SQLite
     // answers "busy" at once, whatever the busy timeout.
     Database(const std::string& path, Access access);
-    Database(Database&& other) noexcept;  // of connections that read: the log's hook knows the writer's address
+    Database(
+        Database&& other) noexcept;  // of connections that read: the log's hook knows the writer's address
     ~Database();
 
     void execute(const char* sql);  // any number of statements without parameters

@@ -1,4 +1,5 @@
-// Opening, looking things up, telling of changes. What changes jobs is in computations.cpp, upkeep in upkeep.cpp.
+// Opening, looking things up, telling of changes. What changes jobs is in computations.cpp, upkeep in
+// upkeep.cpp.
 #include "server/store/store.h"
 
 #include <algorithm>
@@ -67,7 +68,8 @@ std::vector<StoredJob> Store::list(const JobFilter& filter) {
         wanted + " ORDER BY sequence DESC LIMIT ?9");
     return readers_.read([&](Database& database) {
         Statement rows(database, sql, filter.after, filter.process, filter.owner, filter.created_from,
-                       filter.created_to, filter.min_duration_ms, filter.max_duration_ms, now(), filter.limit);
+                       filter.created_to, filter.min_duration_ms, filter.max_duration_ms, now(),
+                       filter.limit);
         std::vector<StoredJob> jobs;
         while (rows.step()) jobs.push_back(read_job(rows));
         return jobs;
@@ -92,10 +94,11 @@ StoreCounts Store::counts() {
 
 std::vector<ResultOutput> Store::results(const std::string& job_hash) {
     return readers_.read([&](Database& database) {
-        Statement rows(database,
-                       "SELECT name, media_type, sha256, bytes, created, last_used FROM results WHERE job_hash=? "
-                       "ORDER BY name",
-                       job_hash);
+        Statement rows(
+            database,
+            "SELECT name, media_type, sha256, bytes, created, last_used FROM results WHERE job_hash=? "
+            "ORDER BY name",
+            job_hash);
         std::vector<ResultOutput> outputs;
         while (rows.step())
             outputs.push_back({rows.text(0), rows.text(1), rows.text(2), rows.integer(3), rows.integer(4),

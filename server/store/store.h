@@ -1,7 +1,7 @@
 // The durable store under the service: jobs, results, surfaces. What a call has returned survives the end of
-// the process and of the machine's power (README.md: what survives what). It knows nothing of HTTP and nothing
-// of how a job is computed: clients speak in job ids, the engine in job hashes, and equal hashes share one
-// computation and one result.
+// the process and of the machine's power (README.md: what survives what). It knows nothing of HTTP and
+// nothing of how a job is computed: clients speak in job ids, the engine in job hashes, and equal hashes
+// share one computation and one result.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -14,13 +14,13 @@
 namespace gonio {
 
 struct StoreOptions {
-    std::string folder;            // made if missing; on a local disk (SQLite's log needs shared memory)
+    std::string folder;                 // made if missing; on a local disk (SQLite's log needs shared memory)
     std::function<int64_t()> now = {};  // ms since the epoch; empty: the system's clock
-    int max_attempts = 5;          // computations of a job that may end with the process
+    int max_attempts = 5;               // computations of a job that may end with the process
 };
 
-// Any thread may call anything. Errors of the disk are Error(io) naming the folder or the file; the store stays
-// usable after them. A failed fsync is not survived: the process aborts (files.h).
+// Any thread may call anything. Errors of the disk are Error(io) naming the folder or the file; the store
+// stays usable after them. A failed fsync is not survived: the process aborts (files.h).
 class Store {
   public:
     // Takes the folder for itself, or throws Error(io). Jobs that were running go back into the queue, to be
@@ -51,7 +51,8 @@ class Store {
 
     // ---- the engine
 
-    // The oldest job whose hash nobody computes, now running. An equal job waits for that one's end and shares it.
+    // The oldest job whose hash nobody computes, now running. An equal job waits for that one's end and
+    // shares it.
     std::optional<ClaimedJob> next_job();
     // To be seen soon, not at once, and not durable.
     void progress(const std::string& job_hash, int percent, const std::string& message);
@@ -80,13 +81,13 @@ class Store {
 
     // ---- upkeep
 
-    // Removes the least recently used results and surfaces until the rest fits the quota, except what unfinished
-    // jobs need, then every object to which no row points.
+    // Removes the least recently used results and surfaces until the rest fits the quota, except what
+    // unfinished jobs need, then every object to which no row points.
     GcReport gc(int64_t quota_bytes);
     // Deep: reads every object and compares its SHA-256.
     StoreCheck check(bool deep);
-    // The document (document.json), the outputs under their names, and a SHA256SUMS of them, into an existing or new
-    // folder. Throws Error(not_found).
+    // The document (document.json), the outputs under their names, and a SHA256SUMS of them, into an existing
+    // or new folder. Throws Error(not_found).
     void export_job(const std::string& id, const std::string& folder);
 
   private:

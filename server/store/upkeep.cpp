@@ -19,17 +19,19 @@ const char* const referenced =
     "SELECT sha256, bytes FROM checkpoints";
 
 bool is_referenced(Database& database, const std::string& sha256) {
-    Statement row(database,
-                  "SELECT 1 WHERE EXISTS(SELECT 1 FROM surfaces WHERE sha256=?1) OR EXISTS(SELECT 1 FROM results WHERE "
-                  "sha256=?1) OR EXISTS(SELECT 1 FROM checkpoints WHERE sha256=?1)",
-                  sha256);
+    Statement row(
+        database,
+        "SELECT 1 WHERE EXISTS(SELECT 1 FROM surfaces WHERE sha256=?1) OR EXISTS(SELECT 1 FROM results WHERE "
+        "sha256=?1) OR EXISTS(SELECT 1 FROM checkpoints WHERE sha256=?1)",
+        sha256);
     return row.step();
 }
 
 int64_t kept_bytes(Database& database) {
-    Statement row(database,
-                  "SELECT coalesce(sum(bytes), 0) FROM (SELECT sha256, bytes FROM surfaces UNION SELECT sha256, bytes "
-                  "FROM results)");
+    Statement row(
+        database,
+        "SELECT coalesce(sum(bytes), 0) FROM (SELECT sha256, bytes FROM surfaces UNION SELECT sha256, bytes "
+        "FROM results)");
     row.step();
     return row.integer(0);
 }
@@ -40,12 +42,13 @@ struct Evictable {
 };
 
 std::vector<Evictable> least_recently_used(Database& database) {
-    Statement rows(database,
-                   "SELECT 1, job_hash, max(last_used) AS used FROM results AS r WHERE NOT EXISTS(SELECT 1 FROM jobs "
-                   "WHERE job_hash=r.job_hash AND status IN ('accepted', 'running')) GROUP BY job_hash "
-                   "UNION ALL SELECT 0, sha256, last_used FROM surfaces AS s WHERE NOT EXISTS(SELECT 1 FROM "
-                   "job_surfaces JOIN jobs ON sequence=job WHERE sha256=s.sha256 AND status IN ('accepted', "
-                   "'running')) ORDER BY used");
+    Statement rows(
+        database,
+        "SELECT 1, job_hash, max(last_used) AS used FROM results AS r WHERE NOT EXISTS(SELECT 1 FROM jobs "
+        "WHERE job_hash=r.job_hash AND status IN ('accepted', 'running')) GROUP BY job_hash "
+        "UNION ALL SELECT 0, sha256, last_used FROM surfaces AS s WHERE NOT EXISTS(SELECT 1 FROM "
+        "job_surfaces JOIN jobs ON sequence=job WHERE sha256=s.sha256 AND status IN ('accepted', "
+        "'running')) ORDER BY used");
     std::vector<Evictable> list;
     while (rows.step()) list.push_back({rows.integer(0) != 0, rows.text(1)});
     return list;
@@ -68,10 +71,11 @@ int64_t evict(Database& database, const Evictable& victim, int64_t at) {
             .run();
     int64_t freed = 0;
     for (const auto& [sha256, bytes] : objects) {
-        Statement still(database,
-                        "SELECT 1 WHERE EXISTS(SELECT 1 FROM surfaces WHERE sha256=?1) OR EXISTS(SELECT 1 FROM results "
-                        "WHERE sha256=?1)",
-                        sha256);
+        Statement still(
+            database,
+            "SELECT 1 WHERE EXISTS(SELECT 1 FROM surfaces WHERE sha256=?1) OR EXISTS(SELECT 1 FROM results "
+            "WHERE sha256=?1)",
+            sha256);
         if (!still.step()) freed += bytes;
     }
     return freed;
@@ -109,7 +113,8 @@ std::string fault_of(const Objects& objects, const std::string& sha256, int64_t 
     if (!deep) return "";
     Sha256 sum;
     try {
-        read_pieces(objects.open(sha256), objects.path(sha256), [&](std::string_view piece) { sum.update(piece); });
+        read_pieces(objects.open(sha256), objects.path(sha256),
+                    [&](std::string_view piece) { sum.update(piece); });
     } catch (const Error& error) {
         return error.what();
     }
@@ -122,9 +127,10 @@ void check_database(Database& database, StoreCheck& report) {
         while (rows.step())
             if (rows.text(0) != "ok") report.faults.push_back(std::string(pragma) + ": " + rows.text(0));
     }
-    Statement empty(database,
-                    "SELECT id FROM jobs AS j WHERE status='successful' AND expires IS NULL AND NOT EXISTS(SELECT 1 "
-                    "FROM results WHERE job_hash=j.job_hash)");
+    Statement empty(
+        database,
+        "SELECT id FROM jobs AS j WHERE status='successful' AND expires IS NULL AND NOT EXISTS(SELECT 1 "
+        "FROM results WHERE job_hash=j.job_hash)");
     while (empty.step()) report.faults.push_back("job " + empty.text(0) + ": is successful without a result");
 }
 
@@ -135,8 +141,8 @@ GcReport Store::gc(int64_t quota_bytes) {
     GcReport report =
         writer_.run([&](Database& database) { return evict_beyond(database, quota_bytes, at); });
 
-    // The rows are gone for good; now the files. In the writer's thread, so that no row comes meanwhile, and a
-    // few at a time, so that others get their turn.
+    // The rows are gone for good; now the files. In the writer's thread, so that no row comes meanwhile, and
+    // a few at a time, so that others get their turn.
     std::vector<std::string> suspects;
     readers_.read([&](Database& database) {
         objects_.for_each([&](const std::string& sha256, int64_t) {
@@ -197,7 +203,8 @@ void Store::export_job(const std::string& id, const std::string& folder) {
                 out << piece;
             });
             if (sum.hex() != output.sha256)
-                throw Error(ErrorCode::io, objects_.path(output.sha256), "", "holds other bytes than its name says");
+                throw Error(ErrorCode::io, objects_.path(output.sha256), "",
+                            "holds other bytes than its name says");
         });
         sums += output.sha256 + "  " + output.name + "\n";
     }

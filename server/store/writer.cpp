@@ -79,7 +79,8 @@ std::vector<Writer::Request> Writer::next_group() {
 
 void Writer::commit(std::vector<Request>& group) {
     if (commit_together(group) || group.size() < 2) return;
-    // A full disk takes the whole transaction with it. What one of them was too large for, the others may pass.
+    // A full disk takes the whole transaction with it. What one of them was too large for, the others may
+    // pass.
     for (Request& request : group) {
         std::vector<Request> alone;
         alone.push_back(std::move(request));

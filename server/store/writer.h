@@ -19,8 +19,8 @@ namespace gonio {
 
 class Writer {
   public:
-    // Both in the writer's thread: before_commit in the transaction of every group, after_change when one that
-    // changed something is durable.
+    // Both in the writer's thread: before_commit in the transaction of every group, after_change when one
+    // that changed something is durable.
     struct Hooks {
         std::function<void(Database&)> before_commit;
         std::function<void()> after_change;
@@ -29,9 +29,9 @@ class Writer {
     Writer(const std::string& path, Hooks hooks);
     ~Writer();  // after everything queued has been answered
 
-    // Queues work(database). Whatever is queued at one time shares one transaction and one sync; the future is
-    // ready when that is durable. `work` may run twice (its neighbours' trouble): it changes the database and
-    // nothing else.
+    // Queues work(database). Whatever is queued at one time shares one transaction and one sync; the future
+    // is ready when that is durable. `work` may run twice (its neighbours' trouble): it changes the database
+    // and nothing else.
     template <class Work>
     auto submit(Work work) {
         return enqueue_work(std::move(work), false);

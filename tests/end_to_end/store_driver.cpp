@@ -1,10 +1,11 @@
 // The store under load, for the tests that kill it, cut its power and fail its system calls: acceptors submit
-// jobs 0, 1, 2... under their keys, workers compute pseudo results in parts, each a checkpoint. What the store has
-// promised is said on stdout, in lines written at once:
+// jobs 0, 1, 2... under their keys, workers compute pseudo results in parts, each a checkpoint. What the
+// store has promised is said on stdout, in lines written at once:
 //   ACK key id            accept() has returned
 //   DONE job_hash sha256  succeed() has returned
 //
-// Usage: store_driver FOLDER accept FIRST COUNT | work | sequence FIRST COUNT | both FIRST COUNT | verify | commits COUNT
+// Usage: store_driver FOLDER accept FIRST COUNT | work | sequence FIRST COUNT | both FIRST COUNT | verify |
+// commits COUNT
 #include <unistd.h>
 
 #include <atomic>
@@ -71,7 +72,8 @@ void compute(Store& store, const std::string& job_hash) {
     }
     const StoredObject table = store.objects().put(whole);
     const StoredObject report = store.objects().put("{\"job_hash\":\"" + job_hash + "\"}");
-    store.succeed(job_hash, {{"table.bin", "application/octet-stream", table}, {"report.json", "application/json", report}});
+    store.succeed(job_hash, {{"table.bin", "application/octet-stream", table},
+                             {"report.json", "application/json", report}});
     say("DONE " + job_hash + " " + table.sha256);
 }
 
@@ -117,7 +119,8 @@ void run_together(Store& store, int64_t first, int64_t count) {
     std::atomic<bool> accepting{true};
     std::vector<std::thread> workers, acceptors;
     for (int k = 0; k < 2; ++k) workers.emplace_back([&] { work(store, accepting); });
-    for (int k = 0; k < 2; ++k) acceptors.emplace_back([&, k] { accept_jobs(store, first + k, count - k, 2); });
+    for (int k = 0; k < 2; ++k)
+        acceptors.emplace_back([&, k] { accept_jobs(store, first + k, count - k, 2); });
     // Not at every run: what an interrupted writer left is to be met by the next one as well.
     if (std::random_device{}() % 4 == 0) insist([&] { store.gc(no_quota); });
     for (std::thread& thread : acceptors) thread.join();
@@ -128,8 +131,8 @@ void run_together(Store& store, int64_t first, int64_t count) {
 int verify(Store& store) {
     const StoreCheck check = store.check(true);
     for (const std::string& fault : check.faults) say("FAULT " + fault);
-    say("CHECKED rows " + std::to_string(check.rows) + " objects " + std::to_string(check.objects) + " orphans " +
-        std::to_string(check.orphans));
+    say("CHECKED rows " + std::to_string(check.rows) + " objects " + std::to_string(check.objects) +
+        " orphans " + std::to_string(check.orphans));
     return check.faults.empty() ? 0 : 1;
 }
 
@@ -147,7 +150,8 @@ void measure_commits(Store& store, int64_t count) {
             });
         for (std::thread& thread : acceptors) thread.join();
         const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-        say(std::to_string(threads) + " threads: " + std::to_string(static_cast<int>(static_cast<double>(count) / seconds.count())) + " accepted/s");
+        say(std::to_string(threads) + " threads: " +
+            std::to_string(static_cast<int>(static_cast<double>(count) / seconds.count())) + " accepted/s");
     }
 }
 

@@ -115,8 +115,8 @@ TEST_F(StoreTest, AnUnfinishedOrWrongObjectLeavesNothing) {
 }
 
 TEST_F(StoreTest, OnlyAHashNamesAnObject) {
-    for (const std::string& name : {std::string("../../jobs.db"), std::string(), std::string(64, 'A'), std::string(63, 'a') + "/",
-                                    sha256_hex("never written")}) {
+    for (const std::string& name : {std::string("../../jobs.db"), std::string(), std::string(64, 'A'),
+                                    std::string(63, 'a') + "/", sha256_hex("never written")}) {
         EXPECT_FALSE(store->objects().exists(name));
         EXPECT_EQ(code_of([&] { store->objects().open(name); }), ErrorCode::not_found) << name;
     }
@@ -376,7 +376,9 @@ TEST_F(StoreTest, OutputsHaveNamesOfFiles) {
     accept("h");
     claim();
     for (const char* name : {"", "../x", "a/b", ".hidden", "SHA256SUMS", "document.json", "a b"})
-        EXPECT_EQ(code_of([&] { store->succeed("h", {{name, "text/csv", store->objects().put("x")}}); }),
+        EXPECT_EQ(code_of([&] {
+                      store->succeed("h", {{name, "text/csv", store->objects().put("x")}});
+                  }),
                   ErrorCode::internal)
             << name;
     EXPECT_TRUE(store->results("h").empty());
@@ -408,11 +410,14 @@ TEST_F(StoreTest, ListsAreFilteredAndPaged) {
         set(one);
         return ids(one);
     };
-    EXPECT_EQ(only([](JobFilter& f) { f.statuses = {JobStatus::running, JobStatus::successful}; }),
+    EXPECT_EQ(only([](JobFilter& f) {
+                  f.statuses = {JobStatus::running, JobStatus::successful};
+              }),
               (std::vector{jobs[1], jobs[0]}));
     EXPECT_EQ(only([](JobFilter& f) { f.owner = "berta"; }), (std::vector{jobs[5], jobs[3], jobs[1]}));
     EXPECT_EQ(only([](JobFilter& f) { f.process = "ndf"; }).size(), 0u);
-    EXPECT_EQ(only([](JobFilter& f) { f.created_from = 2000, f.created_to = 3000; }), (std::vector{jobs[2], jobs[1]}));
+    EXPECT_EQ(only([](JobFilter& f) { f.created_from = 2000, f.created_to = 3000; }),
+              (std::vector{jobs[2], jobs[1]}));
     EXPECT_EQ(only([](JobFilter& f) { f.min_duration_ms = 2500; }), (std::vector{jobs[1], jobs[0]}));
     EXPECT_EQ(only([](JobFilter& f) { f.min_duration_ms = 2501; }), (std::vector{jobs[1]}));
     EXPECT_EQ(only([](JobFilter& f) { f.max_duration_ms = 2500; }), (std::vector{jobs[0]}));
@@ -503,7 +508,8 @@ TEST_F(StoreTest, RemovingAndWritingAtOnceLosesNothing) {
     std::thread collector([&] {
         while (!done) store->gc(int64_t{1} << 40);
     });
-    for (int k = 0; k < 200; ++k) store->save_checkpoint("h", "key", store->objects().put(std::to_string(k % 3)));
+    for (int k = 0; k < 200; ++k)
+        store->save_checkpoint("h", "key", store->objects().put(std::to_string(k % 3)));
     done = true;
     collector.join();
     EXPECT_TRUE(store->check(true).faults.empty());
@@ -575,7 +581,8 @@ class WriterTest : public testing::Test {
     WriterTest() {
         std::string name = (fs::temp_directory_path() / "gonio_writer_XXXXXX").string();
         folder = ::mkdtemp(name.data());
-        writer = std::make_unique<Writer>(folder + "/jobs.db", Writer::Hooks{[this](Database&) { ++groups; }, [] {}, 1});
+        writer = std::make_unique<Writer>(folder + "/jobs.db",
+                                          Writer::Hooks{[this](Database&) { ++groups; }, [] {}, 1});
     }
     ~WriterTest() override {
         writer.reset();
