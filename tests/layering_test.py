@@ -23,6 +23,7 @@ HOMES = {
     r"cairo": ["clients/plot/"],
     r"openssl/": ["core/base/sha256.cpp"],
     r"Random123/": ["core/base/random.h"],
+    r"sqlite3": ["server/store/sqlite.cpp"],
     r"CLI/": ["clients/cli/"],
 }
 # What judges must not include what it judges: the path tracer knows nothing of the fast engine.

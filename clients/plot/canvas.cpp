@@ -6,9 +6,9 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/numeric.h"
-#include "table/io/table_io.h"
 
 namespace gonio {
 

@@ -1,8 +1,6 @@
 // Tables as files. One file a format, one line a format in table_io.cpp. Files are written aside, synced and renamed: a reader never
 // meets half a table, and an interrupted run leaves nothing behind.
 #pragma once
-#include <functional>
-#include <ostream>
 #include <string>
 #include <vector>
 
@@ -18,10 +16,5 @@ void write_table(const Table& table, const std::string& format, const std::strin
 
 // Reads what write_table wrote (csv or json; found by content). Throws Error for anything else.
 Table read_table(const std::string& path);
-
-// Writes `path` aside (same folder), fsyncs it, renames it, fsyncs the folder; removes the temporary if `write` throws.
-void write_file_atomically(const std::string& path, const std::function<void(std::ostream&)>& write);
-// The same for libraries that want a file name: `write` gets the temporary's path.
-void write_path_atomically(const std::string& path, const std::function<void(const std::string& temporary)>& write);
 
 }  // namespace gonio

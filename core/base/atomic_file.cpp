@@ -1,5 +1,7 @@
 // Write aside, sync, rename (the order that survives a power cut: the data before the name, the name before
 // the folder).
+#include "base/atomic_file.h"
+
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -11,7 +13,6 @@
 #include <fstream>
 
 #include "base/error.h"
-#include "table/io/table_io.h"
 
 namespace gonio {
 namespace {
