@@ -42,7 +42,8 @@ std::string read_secret_file(const std::string& path) {
 // Time does not depend on where two digests differ.
 bool equal_digests(std::string_view a, std::string_view b) {
     unsigned difference = a.size() != b.size();
-    for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) difference |= static_cast<unsigned>(a[i] ^ b[i]);
+    for (size_t i = 0; i < std::min(a.size(), b.size()); ++i)
+        difference |= static_cast<unsigned>(a[i] ^ b[i]);
     return difference == 0;
 }
 
@@ -61,7 +62,8 @@ BearerTokens BearerTokens::read(const std::string& path) {
         const std::string where = "line " + std::to_string(number);
         const std::string& token = second.empty() ? first : second;
         // Neither the message nor a log may show it.
-        if (!third.empty()) throw Error(ErrorCode::invalid_input, path, where, "more than a name and a token");
+        if (!third.empty())
+            throw Error(ErrorCode::invalid_input, path, where, "more than a name and a token");
         constexpr size_t least = 16;
         if (token.size() < least) {
             throw Error(ErrorCode::invalid_input, path, where,

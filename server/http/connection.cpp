@@ -133,8 +133,8 @@ size_t Connection::read(char* out, size_t size) {
                 position_ += step.consumed;
                 produced = step.produced;
             } else {
-                produced = static_cast<size_t>(std::min<uint64_t>(
-                    {there.size(), size, head_.content_length - body_read_}));
+                produced = static_cast<size_t>(
+                    std::min<uint64_t>({there.size(), size, head_.content_length - body_read_}));
                 std::memcpy(out, there.data(), produced);
                 position_ += produced;
             }
@@ -175,11 +175,12 @@ bool Connection::connected() const {
 
 void Connection::close_lingering() {
     ::shutdown(socket_, SHUT_WR);
-    constexpr milliseconds longest{2000};
     const Clock::time_point start = Clock::now();
     pollfd in{socket_, POLLIN, 0};
-    for (uint64_t dropped = 0; dropped < 8 << 20 && since(start) < longest;) {
-        if (poll_for(&in, 1, longest - since(start)) <= 0) return;
+    for (uint64_t dropped = 0; dropped < 8 << 20;) {
+        // A client that drips would hold this thread for all of it, so less while others wait for one.
+        const milliseconds left = milliseconds(pressure_.waiting > 0 ? 200 : 2000) - since(start);
+        if (left <= milliseconds(0) || poll_for(&in, 1, left) <= 0) return;
         buffer_.clear();
         if (!receive(block)) return;
         dropped += buffer_.size();

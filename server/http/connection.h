@@ -13,7 +13,7 @@ namespace gonio::http {
 
 // What tells the threads that sit on idle connections to let go.
 struct Pressure {
-    int drain_event;                  // an eventfd, readable for good once the server drains
+    int drain_event;  // an eventfd, readable for good once the server drains
     const std::atomic<bool>& drain;
     const std::atomic<int>& waiting;  // connections that wait for a thread
 };

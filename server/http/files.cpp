@@ -76,7 +76,8 @@ std::string base64_of_hex(std::string_view hex) {
 RangeChoice choose_range(std::string_view header, uint64_t size) {
     using Kind = RangeChoice::Kind;
     const size_t equals = header.find('=');
-    if (equals == std::string_view::npos || !equal_ignoring_case(trimmed(header.substr(0, equals)), "bytes")) {
+    if (equals == std::string_view::npos ||
+        !equal_ignoring_case(trimmed(header.substr(0, equals)), "bytes")) {
         return {};
     }
     const std::string_view spec = trimmed(header.substr(equals + 1));

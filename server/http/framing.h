@@ -57,8 +57,19 @@ class ChunkDecoder {
     bool finished() const { return state_ == State::finished; }
 
   private:
-    enum class State { size, extension, size_lf, data, data_cr, data_lf, trailer_start, trailer, trailer_lf,
-                       end_lf, finished };
+    enum class State {
+        size,
+        extension,
+        size_lf,
+        data,
+        data_cr,
+        data_lf,
+        trailer_start,
+        trailer,
+        trailer_lf,
+        end_lf,
+        finished
+    };
     void step(char c);
     State state_ = State::size;
     uint64_t left_ = 0;  // bytes of this chunk to come

@@ -26,8 +26,9 @@
 
 // This file leans on three protected or public members of one release: process_request(), svr_sock_ and
 // Stream. Another release must be read before it is trusted; self_test() judges what was read.
-static_assert(std::string_view(CPPHTTPLIB_VERSION) == "0.11.4",
-              "guarded_server.cpp was written for Debian 12's cpp-httplib: read process_request() of this one");
+static_assert(
+    std::string_view(CPPHTTPLIB_VERSION) == "0.11.4",
+    "guarded_server.cpp was written for Debian 12's cpp-httplib: read process_request() of this one");
 
 namespace gonio::http {
 namespace {
@@ -296,8 +297,8 @@ void GuardedServer::State::serve(Connection& connection, Library& library) {
         const bool sent = library.send(connection, head ? head->method : "GET", response, keep);
         if (hooks.log) {
             hooks.log(request, response.status,
-                      std::chrono::duration_cast<std::chrono::microseconds>(
-                          std::chrono::steady_clock::now() - start));
+                      std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() -
+                                                                            start));
         }
         if (sent && keep) continue;
         if (!connection.body_finished()) connection.close_lingering();
@@ -368,7 +369,8 @@ namespace {
 template <class Serve>
 std::string answer_to(const std::string& bytes, Serve&& serve) {
     int ends[2];
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) throw_system("self-test", "no sockets");
+    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0)
+        throw_system("self-test", "no sockets");
     // Both directions fit into the buffers of the sockets, so that one thread can do all of it.
     if (::send(ends[0], bytes.data(), bytes.size(), MSG_NOSIGNAL) < 0) throw_system("self-test", "no write");
     ::shutdown(ends[0], SHUT_WR);
@@ -407,7 +409,9 @@ int GuardedServer::listen(const std::string& address, int port) {
         answer_to("GET /text" + rest + "HEAD /stream" + rest + "GET /stream" + rest, serve);
     const std::string smuggled = answer_to(
         "POST /text HTTP/1.1\r\nHost: x\r\nContent-Length: 5\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n"
-        "GET /text" + rest, serve);
+        "GET /text" +
+            rest,
+        serve);
     if (count(good, "HTTP/1.1 200 ") != 3 || count(good, "Content-Length: 1000\r\n") != 3 ||
         count(good, "\r\n\r\n" + text) != 2 || count(smuggled, "HTTP/1.1 ") != 1 ||
         count(smuggled, "HTTP/1.1 400 ") != 1) {

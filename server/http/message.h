@@ -44,12 +44,12 @@ class BodyWriter {
 
 struct Request {
     std::string method;
-    std::string target;                               // as sent, with the query
-    std::vector<std::string> captures;                // what stood for each {} of the route, decoded
-    std::multimap<std::string, std::string> query;    // decoded
-    Headers headers;                                  // values exactly as sent
-    std::string remote_address;                       // of the socket; no header can change it
-    BodyReader* body = nullptr;                       // valid while the handler runs
+    std::string target;                             // as sent, with the query
+    std::vector<std::string> captures;              // what stood for each {} of the route, decoded
+    std::multimap<std::string, std::string> query;  // decoded
+    Headers headers;                                // values exactly as sent
+    std::string remote_address;                     // of the socket; no header can change it
+    BodyReader* body = nullptr;                     // valid while the handler runs
 
     std::string header(std::string_view name) const;  // the first one; "" if there is none
     // All of one name as one list, as RFC 9110 section 5.3 joins them; "" if there is none.

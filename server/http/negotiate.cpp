@@ -21,7 +21,8 @@ std::vector<MediaRange> parse_accept(std::string_view accept) {
             if (!equal_ignoring_case(field.substr(0, 2), "q=")) continue;
             const std::string_view digits = field.substr(2);
             // What is no number from 0 to 1 wants nothing.
-            if (std::from_chars(digits.data(), digits.data() + digits.size(), range.quality).ec != std::errc() ||
+            if (std::from_chars(digits.data(), digits.data() + digits.size(), range.quality).ec !=
+                    std::errc() ||
                 !(range.quality >= 0 && range.quality <= 1)) {
                 range.quality = 0;
             }
@@ -36,7 +37,8 @@ int specificity(std::string_view range, std::string_view type) {
     if (equal_ignoring_case(range, type)) return 3;
     if (range == "*/*") return 1;
     const size_t slash = type.find('/');
-    return range.ends_with("/*") && equal_ignoring_case(range.substr(0, range.size() - 2), type.substr(0, slash))
+    return range.ends_with("/*") &&
+                   equal_ignoring_case(range.substr(0, range.size() - 2), type.substr(0, slash))
                ? 2
                : 0;
 }

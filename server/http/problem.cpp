@@ -96,7 +96,8 @@ Response problem_response(const Problem& problem) {
     }
     Response response;
     response.status = problem.status;
-    // A detail may quote bytes that are no UTF-8, on which dump() would throw in the middle of the error path.
+    // A detail may quote bytes that are no UTF-8, on which dump() would throw in the middle of the error
+    // path.
     response.body = json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
     response.set("Content-Type", "application/problem+json");
     response.set("Cache-Control", "no-store");

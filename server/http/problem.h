@@ -14,8 +14,8 @@ struct Problem {
     std::string type = "about:blank";  // a URI; about:blank says no more than the status
     std::string title;                 // filled with that of the status if empty
     std::string detail;
-    std::string instance;              // which request; the server fills it with the path
-    std::string code;                  // of the Error, as `gonio run --json` names it
+    std::string instance;  // which request; the server fills it with the path
+    std::string code;      // of the Error, as `gonio run --json` names it
     struct At {
         std::string pointer;  // JSON pointer into the body of the request
         std::string detail;
