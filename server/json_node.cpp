@@ -77,34 +77,34 @@ json parse_json_strictly(std::string_view text, const JsonLimits& limits) {
         throw Error(ErrorCode::limit, "", std::to_string(text.size()) + " bytes",
                     "a document may have at most " + std::to_string(limits.max_bytes) + " bytes");
     }
-    std::vector<std::set<std::string>> open_objects;  // keys seen so far
-    std::vector<std::string> open_keys;  // the newest key of each; array positions are not followed
+    struct Open {  // an object or array whose end has not come
+        bool is_array;
+        size_t elements = 0;             // so far
+        std::string key = {};            // the newest
+        std::set<std::string> keys = {};
+    };
+    std::vector<Open> open;
     const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-        switch (event) {
-            case json::parse_event_t::object_start:
-                open_objects.emplace_back();
-                open_keys.emplace_back();
-                [[fallthrough]];
-            case json::parse_event_t::array_start:
-                if (depth >= limits.max_depth) {
-                    throw Error(ErrorCode::invalid_input, "", "",
-                                "the document is nested deeper than " + std::to_string(limits.max_depth));
+        using enum json::parse_event_t;
+        const bool starts = event == object_start || event == array_start;
+        if ((starts || event == value) && !open.empty()) ++open.back().elements;
+        if (starts) {
+            if (depth >= limits.max_depth) {
+                throw Error(ErrorCode::invalid_input, "", "",
+                            "the document is nested deeper than " + std::to_string(limits.max_depth));
+            }
+            open.push_back({event == array_start});
+        } else if (event == object_end || event == array_end) {
+            open.pop_back();
+        } else if (event == key) {
+            open.back().key = pointer_token(parsed.get<std::string>());
+            if (!open.back().keys.insert(open.back().key).second) {
+                std::string path;
+                for (const Open& one : open) {
+                    path += "/" + (one.is_array ? std::to_string(one.elements - 1) : one.key);
                 }
-                break;
-            case json::parse_event_t::object_end:
-                open_objects.pop_back();
-                open_keys.pop_back();
-                break;
-            case json::parse_event_t::key:
-                open_keys.back() = pointer_token(parsed.get<std::string>());
-                if (!open_objects.back().insert(open_keys.back()).second) {
-                    std::string path;
-                    for (const std::string& key : open_keys) path += "/" + key;
-                    throw Error(ErrorCode::invalid_input, path, "", "this key is written twice");
-                }
-                break;
-            default:
-                break;
+                throw Error(ErrorCode::invalid_input, path, "", "this key is written twice");
+            }
         }
         return true;
     };
