@@ -8,7 +8,7 @@
 #include "base/error.h"
 #include "base/sha256.h"
 #include "server/job_hash.h"
-#include "table/io/table_io.h"
+#include "base/atomic_file.h"
 
 namespace gonio {
 namespace {
