@@ -1,5 +1,6 @@
 #include "server/run_job.h"
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -9,6 +10,14 @@
 
 namespace gonio {
 namespace {
+
+// Not the file's name: jobs of equal hash must have equal tables, whatever the file was called.
+std::string size_of(const HeightField& surface) {
+    char text[120];
+    std::snprintf(text, sizeof text, "%d x %d points, pitch %.9g x %.9g m", surface.nx, surface.ny,
+                  surface.pitch_x, surface.pitch_y);
+    return text;
+}
 
 BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOptions& options,
                     const Monitor& monitor) {
@@ -20,7 +29,7 @@ BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOpti
         {"program", program_version()},
         {"job_hash", loaded.hash},
         {"surface_hash", loaded.surface.hash},
-        {"surface", loaded.surface.description},
+        {"surface", size_of(loaded.surface.surface)},
         {"seed", std::to_string(plan.accuracy.seed)},
     };
     result.table.provenance.insert(result.table.provenance.begin(), origin.begin(), origin.end());
