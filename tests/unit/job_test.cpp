@@ -3,6 +3,7 @@
 #include "server/job.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <filesystem>
@@ -377,7 +378,7 @@ TEST(JobHash, NamesTheProgramThatComputes) {
 }
 
 TEST(JobHash, NamesFilesByContent) {
-    const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "gonio_job_test";
+    const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / ("gonio_job_test_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder);
     const auto hash_of_file = [&](const std::string& name, const std::string& content) {
         std::ofstream(folder / name) << content;
@@ -392,7 +393,7 @@ TEST(JobHash, NamesFilesByContent) {
 }
 
 TEST(JobHash, IsFoundInTheHeadOfAResult) {
-    const std::string path = testing::TempDir() + "gonio_is_result_of.csv", hash(64, 'a');
+    const std::string path = testing::TempDir() + "gonio_is_result_of_" + std::to_string(::getpid()) + ".csv", hash(64, 'a');
     std::ofstream(path) << "# job_hash: " << hash << "\n";
     EXPECT_TRUE(is_result_of(path, hash));
     EXPECT_FALSE(is_result_of(path, std::string(64, 'b')));
@@ -460,7 +461,7 @@ class AlbedoMap : public testing::Test {
         for (size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(lambertian.map[k], expected[k], 1e-7) << k;
     }
 
-    std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "gonio_albedo_map";
+    std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / ("gonio_albedo_map_" + std::to_string(::getpid()));
 };
 
 TEST_F(AlbedoMap, FollowsTheSurface) {
