@@ -378,7 +378,8 @@ TEST(JobHash, NamesTheProgramThatComputes) {
 }
 
 TEST(JobHash, NamesFilesByContent) {
-    const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / ("gonio_job_test_" + std::to_string(::getpid()));
+    const std::filesystem::path folder =
+        std::filesystem::path(testing::TempDir()) / ("gonio_job_test_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder);
     const auto hash_of_file = [&](const std::string& name, const std::string& content) {
         std::ofstream(folder / name) << content;
@@ -393,7 +394,8 @@ TEST(JobHash, NamesFilesByContent) {
 }
 
 TEST(JobHash, IsFoundInTheHeadOfAResult) {
-    const std::string path = testing::TempDir() + "gonio_is_result_of_" + std::to_string(::getpid()) + ".csv", hash(64, 'a');
+    const std::string path = testing::TempDir() + "gonio_is_result_of_" + std::to_string(::getpid()) + ".csv",
+                      hash(64, 'a');
     std::ofstream(path) << "# job_hash: " << hash << "\n";
     EXPECT_TRUE(is_result_of(path, hash));
     EXPECT_FALSE(is_result_of(path, std::string(64, 'b')));
@@ -461,7 +463,8 @@ class AlbedoMap : public testing::Test {
         for (size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(lambertian.map[k], expected[k], 1e-7) << k;
     }
 
-    std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / ("gonio_albedo_map_" + std::to_string(::getpid()));
+    std::filesystem::path folder_ =
+        std::filesystem::path(testing::TempDir()) / ("gonio_albedo_map_" + std::to_string(::getpid()));
 };
 
 TEST_F(AlbedoMap, FollowsTheSurface) {
