@@ -53,7 +53,7 @@ std::string suggestion(const std::string& word, const std::vector<std::string>& 
             nearest = &candidate;
         }
     }
-    return nearest ? "; did you mean \"" + *nearest + "\"?" : "";
+    return nearest ? " (did you mean \"" + *nearest + "\"?)" : "";
 }
 
 // What a message shows of a value: scalars as written, the rest by kind (an array may hold millions of
@@ -128,7 +128,7 @@ void JsonNode::allow_keys(const std::vector<std::string>& keys) const {
     for (const auto& [key, value] : json_->items()) {
         if (std::find(keys.begin(), keys.end(), key) != keys.end()) continue;
         throw Error(ErrorCode::invalid_input, path_ + "/" + pointer_token(key), "",
-                    "unknown key" + suggestion(key, keys) + " Allowed here: " + joined(keys));
+                    "unknown key" + suggestion(key, keys) + "; allowed here: " + joined(keys));
     }
 }
 

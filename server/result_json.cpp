@@ -106,33 +106,11 @@ std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>&
 
 std::string failure_json(const Error& error, const JsonStyle& style) {
     return dumped({{"status", "failed"},
-                   {"code", error_code_name(error.code())},
+                   {"code", code_name(error.code())},
                    {"field", error.field()},
                    {"value", error.value()},
                    {"message", error.what()}},
                   style);
-}
-
-std::string error_code_name(ErrorCode code) {
-    switch (code) {
-        case ErrorCode::usage:
-            return "usage";
-        case ErrorCode::invalid_input:
-            return "invalid_input";
-        case ErrorCode::missing_unit:
-            return "missing_unit";
-        case ErrorCode::not_found:
-            return "not_found";
-        case ErrorCode::io:
-            return "io";
-        case ErrorCode::limit:
-            return "limit";
-        case ErrorCode::cancelled:
-            return "cancelled";
-        case ErrorCode::internal:
-            return "internal";
-    }
-    return "internal";
 }
 
 }  // namespace gonio

@@ -28,7 +28,4 @@ std::string skipped_json(const LoadedJob& job, const std::vector<OutputRequest>&
 // status "failed": code, field, value, message.
 std::string failure_json(const Error& error, const JsonStyle& style = {});
 
-// "invalid_input", ...
-std::string error_code_name(ErrorCode code);
-
 }  // namespace gonio

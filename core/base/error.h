@@ -28,6 +28,29 @@ enum class ErrorCode {
     internal,       // a defect of gonio
 };
 
+// As machines read it: "invalid_input", ...
+constexpr const char* code_name(ErrorCode code) {
+    switch (code) {
+        case ErrorCode::usage:
+            return "usage";
+        case ErrorCode::invalid_input:
+            return "invalid_input";
+        case ErrorCode::missing_unit:
+            return "missing_unit";
+        case ErrorCode::not_found:
+            return "not_found";
+        case ErrorCode::io:
+            return "io";
+        case ErrorCode::limit:
+            return "limit";
+        case ErrorCode::cancelled:
+            return "cancelled";
+        case ErrorCode::internal:
+            return "internal";
+    }
+    return "internal";
+}
+
 // `field` is the path of the offending value (a JSON pointer such as "/surface/width", or a file name),
 // `value` what was found there, `what()` the whole sentence: field, value and what is allowed.
 class Error : public std::runtime_error {

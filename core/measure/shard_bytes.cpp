@@ -8,7 +8,6 @@
 namespace gonio {
 namespace {
 
-// One list of members serves writing and reading: visit(archive, values) below.
 class Writer {
   public:
     template <class T>
@@ -61,6 +60,10 @@ class Reader {
     size_t at_ = 0;
 };
 
+// T to read into, const T to write from: one list of members each, below.
+template <class X, class T>
+concept Either = std::is_same_v<std::remove_const_t<X>, T>;
+
 template <class Archive, class M>
 void visit_matrix(Archive& archive, M& m) {
     archive(m.rows);
@@ -83,8 +86,8 @@ void visit_fields(Reader& archive, Fields& fields) {
     fields = Fields(unknowns, columns, std::move(values));
 }
 
-template <class Archive, class Run>
-void visit_run(Archive& archive, Run& run) {
+template <class Archive, Either<RunValues> Run>
+void visit(Archive& archive, Run& run) {
     archive(run.higher_orders);
     archive(run.applications);
     archive(run.ratio);
@@ -106,33 +109,35 @@ void visit_run(Archive& archive, Run& run) {
     archive(run.seconds_series);
 }
 
-template <class Archive, class Bias>
-void visit_noise(Archive& archive, Bias& bias) {
+template <class Archive, Either<NoiseBias> Bias>
+void visit(Archive& archive, Bias& bias) {
     archive(bias.kappa);
     archive(bias.doubt);
     visit_matrix(archive, bias.pairs);
     archive(bias.core_area);
 }
 
-template <class Archive, class Bias>
-void visit_mesh(Archive& archive, Bias& bias) {
+template <class Archive, Either<MeshBias> Bias>
+void visit(Archive& archive, Bias& bias) {
     uint64_t orders = bias.exact.size();
     archive(orders);
-    bias.exact.resize(orders);
-    bias.coarse.resize(orders);
+    if constexpr (!std::is_const_v<Bias>) {
+        bias.exact.resize(orders);
+        bias.coarse.resize(orders);
+    }
     for (auto& m : bias.exact) visit_matrix(archive, m);
     for (auto& m : bias.coarse) visit_matrix(archive, m);
     archive(bias.asked);
     int all_pairs = bias.all_pairs;
     archive(all_pairs);
-    bias.all_pairs = all_pairs != 0;
+    if constexpr (!std::is_const_v<Bias>) bias.all_pairs = all_pairs != 0;
     archive(bias.guess);
     archive(bias.guess_caution);
     archive(bias.ratio);
 }
 
-template <class Archive, class Tally>
-void visit_tally(Archive& archive, Tally& tally) {
+template <class Archive, Either<PathTally> Tally>
+void visit(Archive& archive, Tally& tally) {
     archive(tally.sum);
     archive(tally.squared_spread);
     archive(tally.rays.camera);
@@ -142,63 +147,48 @@ void visit_tally(Archive& archive, Tally& tally) {
     archive(tally.rays.lost);
 }
 
+template <class T>
+std::string encoded(const T& value) {
+    Writer writer;
+    visit(writer, value);
+    return writer.take();
+}
+
+template <class T>
+T decoded(const std::string& bytes) {
+    T value;
+    Reader reader(bytes);
+    visit(reader, value);
+    reader.expect_end();
+    return value;
+}
+
 }  // namespace
 
 std::string to_bytes(const RunValues& values) {
-    Writer writer;
-    visit_run(writer, values);
-    return writer.take();
+    return encoded(values);
 }
-
-std::string to_bytes(const PathTally& tally) {
-    Writer writer;
-    visit_tally(writer, tally);
-    return writer.take();
-}
-
 std::string to_bytes(const NoiseBias& bias) {
-    Writer writer;
-    visit_noise(writer, bias);
-    return writer.take();
+    return encoded(bias);
 }
-
 std::string to_bytes(const MeshBias& bias) {
-    Writer writer;
-    MeshBias copy = bias;  // visit_mesh sizes its lists, which are those of the copy already
-    visit_mesh(writer, copy);
-    return writer.take();
+    return encoded(bias);
+}
+std::string to_bytes(const PathTally& tally) {
+    return encoded(tally);
 }
 
 RunValues run_values_from(const std::string& bytes) {
-    RunValues values;
-    Reader reader(bytes);
-    visit_run(reader, values);
-    reader.expect_end();
-    return values;
+    return decoded<RunValues>(bytes);
 }
-
 NoiseBias noise_bias_from(const std::string& bytes) {
-    NoiseBias bias;
-    Reader reader(bytes);
-    visit_noise(reader, bias);
-    reader.expect_end();
-    return bias;
+    return decoded<NoiseBias>(bytes);
 }
-
 MeshBias mesh_bias_from(const std::string& bytes) {
-    MeshBias bias;
-    Reader reader(bytes);
-    visit_mesh(reader, bias);
-    reader.expect_end();
-    return bias;
+    return decoded<MeshBias>(bytes);
 }
-
 PathTally path_tally_from(const std::string& bytes) {
-    PathTally tally;
-    Reader reader(bytes);
-    visit_tally(reader, tally);
-    reader.expect_end();
-    return tally;
+    return decoded<PathTally>(bytes);
 }
 
 }  // namespace gonio

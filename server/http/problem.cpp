@@ -5,28 +5,6 @@
 namespace gonio::http {
 namespace {
 
-const char* code_name(ErrorCode code) {
-    switch (code) {
-        case ErrorCode::usage:
-            return "usage";
-        case ErrorCode::invalid_input:
-            return "invalid_input";
-        case ErrorCode::missing_unit:
-            return "missing_unit";
-        case ErrorCode::not_found:
-            return "not_found";
-        case ErrorCode::io:
-            return "io";
-        case ErrorCode::limit:
-            return "limit";
-        case ErrorCode::cancelled:
-            return "cancelled";
-        case ErrorCode::internal:
-            return "internal";
-    }
-    return "internal";
-}
-
 Problem internal_problem() {
     Problem problem;
     problem.code = code_name(ErrorCode::internal);

@@ -1,7 +1,6 @@
 #include "server/service/engine.h"
 
-#include <unistd.h>
-
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -51,18 +50,35 @@ StoredObject put_file(Objects& objects, const std::string& path) {
 constexpr std::pair<const char*, const char*> table_outputs[] = {
     {"csv", "text/csv"}, {"json", "application/json"}, {"exr", "image/x-exr"}};
 
+// Gone with all that is in it, also when the disk was full.
+class TemporaryFolder {
+  public:
+    TemporaryFolder() {
+        std::string name = (std::filesystem::temp_directory_path() / "gonio-XXXXXX").string();
+        if (!::mkdtemp(name.data())) throw Error(ErrorCode::io, name, "", "cannot be made");
+        path_ = name;
+    }
+    TemporaryFolder(const TemporaryFolder&) = delete;
+    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+    ~TemporaryFolder() {
+        std::error_code ignored;
+        std::filesystem::remove_all(path_, ignored);
+    }
+    const std::filesystem::path& path() const { return path_; }
+
+  private:
+    std::filesystem::path path_;
+};
+
 // The table in every format, and the report.
 std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, const BrdfResult& result) {
     std::vector<NewOutput> outputs;
-    const std::filesystem::path folder =
-        std::filesystem::temp_directory_path() / ("gonio-" + std::to_string(::getpid()) + "-" + loaded.hash);
-    std::filesystem::create_directories(folder);
+    const TemporaryFolder folder;
     for (const auto& [format, media_type] : table_outputs) {
-        const std::string path = (folder / (std::string("table.") + format)).string();
+        const std::string name = std::string("table.") + format, path = (folder.path() / name).string();
         write_table(result.table, format, path);
-        outputs.push_back({std::string("table.") + format, media_type, put_file(objects, path)});
+        outputs.push_back({name, media_type, put_file(objects, path)});
     }
-    std::filesystem::remove_all(folder);
     outputs.push_back(
         {"report.json", "application/json", objects.put(result_json(loaded, result.report, {}, {}))});
     return outputs;
