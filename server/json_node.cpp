@@ -41,7 +41,7 @@ size_t edit_distance(const std::string& a, const std::string& b) {
     return row.back();
 }
 
-// "; did you mean ...?", or nothing when no allowed word is within a third of the letters (and a key is of a
+// " (did you mean ...?", or nothing when no allowed word is within a third of the letters (and a key is of a
 // sane length).
 std::string suggestion(const std::string& word, const std::vector<std::string>& allowed) {
     if (word.size() > 64) return "";
