@@ -17,10 +17,17 @@
 
 namespace gonio {
 
+// How a file of heights or albedos is read; the service reads those of strangers in a process of their own.
+using HeightReader = std::function<RawHeights(const std::string& path)>;
+inline RawHeights read_trusted_heights(const std::string& path) {
+    return read_heights(path);
+}
+
 // Where the relief comes from. A file is not opened before load_job().
 struct FileSurface {
     std::string path;  // as the document says, resolved against JobOrigin::folder
     PrepareOptions options;
+    HeightReader read = read_trusted_heights;
 };
 struct GridSurface {
     RawHeights grid;  // row 0 at y = 0
@@ -36,6 +43,7 @@ struct MaterialSource {
     Material material;  // complete, or with an empty reflectance if there is a map
     // Paths of images registered to the stored surface, one a channel; empty for constant albedo.
     std::vector<std::string> albedo_maps;
+    HeightReader read = read_trusted_heights;
 };
 
 // What is measured. A new kind is one alternative here, one parser (server/README.md says where) and one

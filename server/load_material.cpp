@@ -32,8 +32,8 @@ int mirrored_cell(int k, int n) {
     return k < n ? k : std::max(0, 2 * n - 2 - k);
 }
 
-RawHeights read_albedos(const std::string& path) {
-    RawHeights raw = read_heights(path);
+RawHeights read_albedos(const std::string& path, const HeightReader& read) {
+    RawHeights raw = read(path);
     const double scale = raw.integer_max > 0 ? 1 / raw.integer_max : 1;
     for (size_t k = 0; k < raw.values.size(); ++k) {
         raw.values[k] *= scale;
@@ -49,9 +49,8 @@ RawHeights read_albedos(const std::string& path) {
 }
 
 // One channel's map, appended to the channels before it.
-void load_map(const std::string& path, const SurfaceSource& source, const LoadedSurface& loaded,
-              Lambertian& lambertian) {
-    RawHeights raw = read_albedos(path);
+void load_map(RawHeights raw, const std::string& path, const SurfaceSource& source,
+              const LoadedSurface& loaded, Lambertian& lambertian) {
     const int nx = loaded.stored_nx ? loaded.stored_nx : loaded.surface.nx;
     const int ny = loaded.stored_ny ? loaded.stored_ny : loaded.surface.ny;
     if (raw.nx != nx || raw.ny != ny) {
@@ -78,7 +77,7 @@ Material load_material(const MaterialSource& source, const SurfaceSource& surfac
     if (!source.albedo_maps.empty()) {
         Lambertian lambertian;
         for (const std::string& path : source.albedo_maps)
-            load_map(path, surface_source, surface, lambertian);
+            load_map(read_albedos(path, source.read), path, surface_source, surface, lambertian);
         material.reflectance = std::move(lambertian);
     }
     validate(material, surface.surface.nx, surface.surface.ny);

@@ -22,7 +22,7 @@ LoadedSurface from_stored(RawHeights raw, const PrepareOptions& options, const s
 }
 
 LoadedSurface load(const FileSurface& source) {
-    return from_stored(read_heights(source.path), source.options,
+    return from_stored(source.read(source.path), source.options,
                        std::filesystem::path(source.path).filename().string());
 }
 

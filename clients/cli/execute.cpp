@@ -77,6 +77,8 @@ int exit_code(ErrorCode code) {
             return 3;
         case ErrorCode::cancelled:
             return cancelled_exit_code();
+        case ErrorCode::unreachable:
+            return 4;
         case ErrorCode::limit:
             return 6;
         case ErrorCode::io:

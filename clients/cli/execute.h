@@ -23,7 +23,7 @@ int execute_job(const Job& job, const CommonOptions& common,
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
                      const CommonOptions& common, const ShardTask& task = {});
 
-// 1 failed, 2 wrong usage, 3 invalid input, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
+// 1 failed, 2 wrong usage, 3 invalid input, 4 server unreachable, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
 int exit_code(ErrorCode code);
 // Of `gonio shard` and `gonio merge`, which need other shards first.
 inline constexpr int shards_missing_exit_code = 7;

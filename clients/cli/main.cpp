@@ -58,7 +58,8 @@ int main(int argc, char** argv) {
         "  gonio run lava.json                   a job document (gonio measure --print-job makes one)\n"
         "  gonio info scan.gsf                   what is this surface?\n"
         "  gonio measure --help                  every option, with examples\n"
-        "Exit codes: 0 ok, 1 job failed, 2 wrong usage, 3 invalid input, 5 cancelled, 6 beyond a limit, 7 "
+        "Exit codes: 0 ok, 1 job failed, 2 wrong usage, 3 invalid input, 4 server unreachable, 5 cancelled, "
+        "6 beyond a limit, 7 "
         "shards are missing, 130 Ctrl-C.");
     app.set_version_flag("--version", gonio::program_version());
     app.require_subcommand(1);
@@ -70,6 +71,9 @@ int main(int argc, char** argv) {
     gonio::add_shard(app, common, action);
     gonio::add_merge(app, common, action);
     gonio::add_serve(app, common, action);
+    gonio::add_decode_untrusted(app, action);
+    gonio::add_remote_commands(app, common, action);
+    gonio::add_store(app, common, action);
     gonio::add_plot(app, common, action);
     gonio::add_ndf(app, common, action);
     gonio::add_schema(app, action);

@@ -24,6 +24,7 @@ enum class ErrorCode {
     not_found,      // a file that is not there
     io,             // the system refused to read or write
     limit,          // larger than a configured limit
+    unreachable,    // a service that does not answer
     cancelled,      // the user stopped the work
     internal,       // a defect of gonio
 };
@@ -43,6 +44,8 @@ constexpr const char* code_name(ErrorCode code) {
             return "io";
         case ErrorCode::limit:
             return "limit";
+        case ErrorCode::unreachable:
+            return "unreachable";
         case ErrorCode::cancelled:
             return "cancelled";
         case ErrorCode::internal:

@@ -20,7 +20,6 @@ namespace gonio {
 namespace {
 
 constexpr int most_stages = 12;
-constexpr double default_target = 0.01;
 
 // Everything that one measurement carries from stage to stage.
 class Measurement {
@@ -94,10 +93,7 @@ class Measurement {
     double seconds() const {
         return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
     }
-    double target() const {
-        if (plan_.accuracy.target_relative_error) return *plan_.accuracy.target_relative_error;
-        return plan_.accuracy.max_seconds || plan_.accuracy.samples ? 0.0 : default_target;
-    }
+    double target() const { return plan_.accuracy.target(); }
 
     void prepare(double largest_albedo) {
         const HeightField& s = scene_.surface;
@@ -326,7 +322,7 @@ void Measurement::measure() {
                         std::to_string(samples->directions),
                         "needs at least 16 refinement^2 = " + std::to_string(least));
     } else {
-        stages[0].settings = first_settings(context_, wanted > 0 ? wanted : default_target);
+        stages[0].settings = first_settings(context_, wanted > 0 ? wanted : Accuracy::default_target);
     }
     if (const double least = run_bytes(context_, stages[0].settings, column_block, column_block);
         least > static_cast<double>(options_.max_bytes))

@@ -12,7 +12,7 @@
 namespace gonio {
 
 struct Accuracy {
-    // Exactly one of the three says when to stop; all empty means target 0.01.
+    // Exactly one of the three says when to stop; all empty means default_target.
     std::optional<double>
         target_relative_error;          // rms over the table of sqrt(se^2 + bias^2) / max(f, 0.01 mean f)
     std::optional<double> max_seconds;  // may also stand beside a target: whichever comes first
@@ -24,6 +24,13 @@ struct Accuracy {
     };
     std::optional<Samples> samples;  // explicit settings
     uint64_t seed = 1;
+
+    static constexpr double default_target = 0.01;
+    // Relative error to stop at; 0 if only time or settings are given.
+    double target() const {
+        if (target_relative_error) return *target_relative_error;
+        return max_seconds || samples ? 0.0 : default_target;
+    }
 };
 
 struct BrdfPlan {

@@ -261,7 +261,7 @@ Response GuardedServer::State::respond(Request& request) {
     const std::string path = request.target.substr(0, request.target.find('?'));
     try {
         request.query = query_parameters(request.target);
-        if (hooks.gate) hooks.gate(request);
+        if (hooks.gate) request.user = hooks.gate(request);
         return router.find(request)(request);
     } catch (...) {
         Response response = problem_response(std::current_exception(), path);

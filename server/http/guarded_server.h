@@ -14,8 +14,8 @@ namespace gonio::http {
 
 // What the service may hang into every request; each may be left empty. They are called from many threads.
 struct ServerHooks {
-    // Before the route is looked up: throws (bearer tokens, "not ready") to refuse. The body is not read yet.
-    std::function<void(const Request&)> gate;
+    // Before the route is looked up: who asks (Request::user), or throws to refuse. The body is not read yet.
+    std::function<std::string(const Request&)> gate;
     // After the answer. `status` is that of the response; 0 if the request was no HTTP.
     std::function<void(const Request&, int status, std::chrono::microseconds)> log;
     // The text of an error that the client must not see.

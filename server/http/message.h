@@ -49,6 +49,7 @@ struct Request {
     std::multimap<std::string, std::string> query;  // decoded
     Headers headers;                                // values exactly as sent
     std::string remote_address;                     // of the socket; no header can change it
+    std::string user;                               // what the gate said; empty without one
     BodyReader* body = nullptr;                     // valid while the handler runs
 
     std::string header(std::string_view name) const;  // the first one; "" if there is none

@@ -36,6 +36,7 @@ int http_status(ErrorCode code) {
             return 409;
         case ErrorCode::io:
             return 503;
+        case ErrorCode::unreachable:
         case ErrorCode::internal:
             return 500;
     }

@@ -1,20 +1,24 @@
 #include "server/service/engine.h"
 
-#include <cstdlib>
-#include <filesystem>
+#include <cmath>
 #include <fstream>
 #include <iterator>
-#include <nlohmann/json.hpp>
 
-#include "server/json_node.h"
+#include "base/text.h"
 #include "server/result_json.h"
-#include "table/io/table_io.h"
+#include "server/service/processes.h"
 
 namespace gonio {
 namespace {
 
 using namespace std::chrono_literals;
-using nlohmann::json;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto between_upkeeps = 10min;
+
+double seconds_since(Clock::time_point start) {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 // Checkpoints of one job in the store.
 class StoredCheckpoints : public Checkpoints {
@@ -38,87 +42,22 @@ class StoredCheckpoints : public Checkpoints {
     std::string job_hash_;
 };
 
-StoredObject put_file(Objects& objects, const std::string& path) {
-    ObjectWriter writer = objects.writer();
-    std::ifstream in(path, std::ios::binary);
-    std::string piece(1 << 20, '\0');
-    while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0)
-        writer.write({piece.data(), static_cast<size_t>(in.gcount())});
-    return writer.finish();
-}
-
-constexpr std::pair<const char*, const char*> table_outputs[] = {
-    {"csv", "text/csv"}, {"json", "application/json"}, {"exr", "image/x-exr"}};
-
-// Gone with all that is in it, also when the disk was full.
-class TemporaryFolder {
-  public:
-    TemporaryFolder() {
-        std::string name = (std::filesystem::temp_directory_path() / "gonio-XXXXXX").string();
-        if (!::mkdtemp(name.data())) throw Error(ErrorCode::io, name, "", "cannot be made");
-        path_ = name;
-    }
-    TemporaryFolder(const TemporaryFolder&) = delete;
-    TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    const std::filesystem::path& path() const { return path_; }
-
-  private:
-    std::filesystem::path path_;
-};
-
-// The table in every format, and the report.
-std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, const BrdfResult& result) {
-    std::vector<NewOutput> outputs;
-    const TemporaryFolder folder;
-    for (const auto& [format, media_type] : table_outputs) {
-        const std::string name = std::string("table.") + format, path = (folder.path() / name).string();
-        write_table(result.table, format, path);
-        outputs.push_back({name, media_type, put_file(objects, path)});
-    }
-    outputs.push_back(
-        {"report.json", "application/json", objects.put(result_json(loaded, result.report, {}, {}))});
-    return outputs;
+PreparedJob prepare(const ClaimedJob& claimed, Objects& objects) {
+    const ServiceProcess* process = find_process(claimed.job.process);
+    if (!process)
+        throw Error(ErrorCode::invalid_input, "process", claimed.job.process,
+                    "this program does not have it");
+    return process->prepare(nlohmann::json::parse(claimed.document), objects);
 }
 
 }  // namespace
 
-ServiceJob load_service_job(const std::string& document, Objects& objects) {
-    json job = json::parse(document);
-    ServiceJob result;
-    const JsonNode root(job, "");
-    const std::optional<JsonNode> surface = root.find("surface");
-    if (surface && surface->raw().is_object()) {
-        if (const auto file = surface->find("file"))
-            file->refuse(R"(files of the server are not read: upload it and give its "sha256")");
-        if (const auto named = surface->find("sha256")) {
-            const std::string sha256 = named->text();
-            if (!objects.exists(sha256))
-                named->refuse("is no surface that was uploaded (PUT /surfaces/{sha256})");
-            result.surfaces.push_back(sha256);
-            job["surface"].erase("sha256");
-            job["surface"]["file"] = objects.path(sha256);
-        }
-    }
-    if (const auto material = root.find("material"); material && material->raw().is_object())
-        if (const auto albedo = material->find("albedo"); albedo && albedo->raw().is_object())
-            for (const char* key : {"file", "files"})
-                if (const auto file = albedo->find(key)) file->refuse("files of the server are not read");
-    std::optional<ReferenceOptions> reference;
-    if (const auto traced = root.find("reference")) {
-        traced->allow_keys({"paths"});
-        reference = ReferenceOptions{static_cast<long long>(traced->at("paths").whole_number(1, 1 << 30))};
-        job.erase("reference");
-    }
-    result.loaded = load_job(parse_job(job.dump(), {}), reference);
-    return result;
-}
-
-Engine::Engine(Store& store, const EngineOptions& options)
-    : store_(store), options_(options), worker_([this] { work(); }), watcher_([this] { watch(); }) {}
+Engine::Engine(Store& store, JobTimes& times, EngineOptions options)
+    : store_(store),
+      times_(times),
+      options_(std::move(options)),
+      worker_([this] { work(); }),
+      watcher_([this] { watch(); }) {}
 
 Engine::~Engine() {
     ending_ = true;
@@ -143,38 +82,52 @@ void Engine::work() {
     }
 }
 
-// A running job that is dismissed must end within a second.
+// A running job that is dismissed must end within a second, one that is out of time at once. And what is
+// beyond the quota goes.
 void Engine::watch() {
+    Clock::time_point next_upkeep = Clock::now();
     while (!ending_) {
         std::this_thread::sleep_for(100ms);
-        const std::lock_guard lock(current_mutex_);
-        if (!current_hash_.empty() && store_.stop_requested(current_hash_)) cancel_ = true;
+        try {
+            {
+                const std::lock_guard lock(current_mutex_);
+                if (!current_hash_.empty()) {
+                    if (store_.stop_requested(current_hash_)) cancel_ = true;
+                    if (seconds_since(current_since_) > options_.limits.job_seconds)
+                        out_of_time_ = cancel_ = true;
+                }
+            }
+            if (Clock::now() < next_upkeep) continue;
+            next_upkeep = Clock::now() + between_upkeeps;
+            static_cast<void>(store_.gc(options_.limits.stored_bytes));
+        } catch (const Error&) {  // the disk: once more, next time
+        }
     }
 }
 
 void Engine::compute(const ClaimedJob& claimed) {
     const std::string& hash = claimed.job.job_hash;
+    const Clock::time_point began = Clock::now();
     {
         const std::lock_guard lock(current_mutex_);
         current_hash_ = hash;
+        current_since_ = began;
+        out_of_time_ = false;
         cancel_ = ending_.load();
     }
     Monitor monitor;
     monitor.cancel_requested = &cancel_;
     monitor.on_progress = [&](const Progress& progress) {
-        store_.progress(hash, std::clamp(static_cast<int>(100 * progress.fraction), 0, 99), progress.stage);
+        store_.progress(hash, std::clamp(static_cast<int>(100 * progress.fraction), 0, 99), progress.stage,
+                        std::llround(1e9 * std::min(progress.relative_error, 1e3)));
     };
     std::optional<Error> failure;
     try {
-        const ServiceJob job = load_service_job(claimed.document, store_.objects());
+        const PreparedJob job = prepare(claimed, store_.objects());
         StoredCheckpoints checkpoints(store_, hash);
-        RunOptions options;
-        options.n_threads = options_.n_threads;
-        options.max_bytes = options_.max_bytes;
-        options.checkpoints = &checkpoints;
-        const BrdfResult result = run_job(job.loaded, options, monitor);
-        monitor.check_cancelled();
-        store_.succeed(hash, make_outputs(store_.objects(), job.loaded, result));
+        RunOptions run = options_.run;
+        run.checkpoints = &checkpoints;
+        store_.succeed(hash, job.run(store_.objects(), run, monitor));
     } catch (const Error& error) {
         failure = error;
     } catch (const std::bad_alloc&) {
@@ -186,13 +139,29 @@ void Engine::compute(const ClaimedJob& claimed) {
         const std::lock_guard lock(current_mutex_);
         current_hash_.clear();
     }
-    if (!failure) return;
-    if (failure->code() != ErrorCode::cancelled)
-        store_.fail(hash, failure->what(), failure_json(*failure, {-1, ""}));
-    else if (store_.stop_requested(hash))
+    const std::string status = failure ? end_with(claimed, *failure, out_of_time_) : "successful";
+    const double seconds = seconds_since(began);
+    times_.record(seconds);
+    if (options_.on_end) options_.on_end(claimed.job.process, status, seconds);
+}
+
+std::string Engine::end_with(const ClaimedJob& claimed, const Error& failure, bool out_of_time) {
+    const std::string& hash = claimed.job.job_hash;
+    auto failed = [&](const Error& error) {
+        store_.fail(hash, error.what(), failure_json(error, {-1, ""}));
+        return "failed";
+    };
+    if (failure.code() != ErrorCode::cancelled) return failed(failure);
+    if (store_.stop_requested(hash)) {
         store_.stopped(hash);
-    else
-        store_.release(hash);
+        return "dismissed";
+    }
+    if (out_of_time)
+        return failed({ErrorCode::limit, "", "",
+                       "took longer than the " + number_text(options_.limits.job_seconds) +
+                           " s that this service allows a job"});
+    store_.release(hash);
+    return "released";
 }
 
 }  // namespace gonio

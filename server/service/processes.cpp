@@ -11,18 +11,8 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 const std::vector<ServiceProcess>& service_processes() {
-    static const std::vector<ServiceProcess> processes = {
-        {"brdf",
-         "BRDF of a height field",
-         "Shadowing, masking and every order of diffuse scattering, each value with its standard error and "
-         "bias.",
-         {"surface", "material", "measure", "accuracy"},
-         {"surface", "material", "measure"}},
-        {"reference",
-         "The same by path tracing",
-         "An unbiased path tracer that shares no code with process brdf: slow, to judge it by.",
-         {"surface", "material", "measure", "accuracy", "reference"},
-         {"surface", "material", "measure", "reference"}}};
+    static const std::vector<ServiceProcess> processes = {brdf_process(), reference_process(),
+                                                          statistics_process()};
     return processes;
 }
 
@@ -39,9 +29,13 @@ ordered_json process_summary(const ServiceProcess& process) {
             {"description", process.description},
             {"jobControlOptions", {"async-execute", "dismiss"}},
             {"outputTransmission", {"reference"}},
-            {"links",
-             ordered_json::array(
-                 {{{"href", "/processes/" + process.id}, {"rel", "self"}, {"type", "application/json"}}})}};
+            {"links", ordered_json::array({{{"href", "/processes/" + process.id},
+                                            {"rel", "self"},
+                                            {"type", "application/json"},
+                                            {"title", "description"}},
+                                           {{"href", "/processes/" + process.id + "/execution"},
+                                            {"rel", "http://www.opengis.net/def/rel/ogc/1.0/execute"},
+                                            {"title", "execution"}}})}};
 }
 
 ordered_json process_description(const ServiceProcess& process) {
@@ -53,21 +47,18 @@ ordered_json process_description(const ServiceProcess& process) {
         input["title"] = name;
         input["minOccurs"] = needed ? 1 : 0;
         input["maxOccurs"] = 1;
-        if (schema.at("properties").contains(name))
-            input["schema"] = schema.at("properties").at(name);
-        else
-            input["schema"] = {{"type", "object"},
-                               {"properties", {{"paths", {{"type", "integer"}, {"minimum", 1}}}}}};
+        input["schema"] = process.own_schemas.contains(name) ? process.own_schemas.at(name)
+                                                             : schema.at("properties").at(name);
     }
-    description["outputs"]["table"] = {
-        {"title", "values, standard errors and biases"},
-        {"schema",
-         {{"oneOf", ordered_json::array({{{"type", "string"}, {"contentMediaType", "text/csv"}},
-                                         {{"type", "object"}, {"contentMediaType", "application/json"}},
-                                         {{"type", "string"}, {"contentMediaType", "image/x-exr"}}})}}}};
-    description["outputs"]["report"] = {
-        {"title", "what was chosen, skipped, counted, and how long it took"},
-        {"schema", {{"type", "object"}, {"contentMediaType", "application/json"}}}};
+    for (const ProcessOutput& output : process.outputs) {
+        ordered_json formats = ordered_json::array();
+        for (const OutputFormat& format : output.formats) {
+            const bool is_json = std::string(format.media_type) == "application/json";
+            formats.push_back(
+                {{"type", is_json ? "object" : "string"}, {"contentMediaType", format.media_type}});
+        }
+        description["outputs"][output.name] = {{"title", output.title}, {"schema", {{"oneOf", formats}}}};
+    }
     return description;
 }
 

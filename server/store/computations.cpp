@@ -121,7 +121,9 @@ std::optional<ClaimedJob> Store::next_job() {
         Statement oldest(database,
                          "SELECT id, document FROM jobs AS mine WHERE status='accepted' AND NOT EXISTS("
                          "SELECT 1 FROM jobs WHERE job_hash=mine.job_hash AND status='running') "
-                         "ORDER BY sequence LIMIT 1");
+                         "ORDER BY (SELECT max(attempts) FROM jobs WHERE job_hash=mine.job_hash AND "
+                         "status='accepted') > 3, "
+                         "sequence LIMIT 1");
         if (!oldest.step()) return {};
         const std::string id = oldest.text(0);
         Statement(database,
@@ -214,6 +216,10 @@ void Store::save_checkpoint(const std::string& job_hash, const std::string& key,
     writer_.run([&](Database& database) {
         Statement(database, "INSERT OR REPLACE INTO checkpoints VALUES(?,?,?,?)", job_hash, key,
                   object.sha256, object.bytes)
+            .run();
+        // Who gets on is not what ends the process: only attempts without a new checkpoint count.
+        Statement(database, "UPDATE jobs SET attempts=1 WHERE job_hash=? AND status='running' AND attempts>1",
+                  job_hash)
             .run();
         return true;
     });

@@ -26,7 +26,7 @@ JobStatus status_named(std::string_view name) {
 std::string select_jobs(const std::string& rest) {
     return "SELECT sequence, id, process, job_hash, owner, status, message, progress, created, started, "
            "finished, "
-           "updated, expires, version, attempts, stop_requested, problem FROM jobs " +
+           "updated, expires, version, attempts, stop_requested, problem, relative_error_ppb FROM jobs " +
            rest;
 }
 
@@ -49,6 +49,7 @@ StoredJob read_job(const Statement& row) {
     job.attempts = static_cast<int>(row.integer(14));
     job.stop_requested = row.integer(15) != 0;
     job.problem = row.optional_text(16);
+    job.relative_error_ppb = row.optional_integer(17);
     return job;
 }
 

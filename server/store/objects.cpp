@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <utility>
 
 #include "base/error.h"
@@ -106,6 +107,16 @@ StoredObject Objects::put(std::string_view bytes) {
     ObjectWriter writer(*this);
     writer.write(bytes);
     return writer.finish();
+}
+
+StoredObject Objects::put_file(const std::string& path) {
+    ObjectWriter out = writer();
+    std::ifstream in(path, std::ios::binary);
+    std::string piece(size_t{1} << 20, '\0');
+    while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0)
+        out.write({piece.data(), static_cast<size_t>(in.gcount())});
+    if (!in.eof()) throw Error(ErrorCode::io, path, "", "cannot be read");
+    return out.finish();
 }
 
 std::string Objects::folder_of(std::string_view sha256) const {

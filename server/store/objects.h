@@ -55,8 +55,10 @@ class Objects {
     // Makes what is missing under `folder` and removes what unfinished writers of an earlier process left.
     explicit Objects(const std::string& folder);
 
+    const std::string& folder() const { return folder_; }
     ObjectWriter writer() { return ObjectWriter(*this); }
     StoredObject put(std::string_view bytes);
+    StoredObject put_file(const std::string& path);
 
     // Throw Error(not_found); a text that is no SHA-256 is never found.
     std::string path(std::string_view sha256) const;

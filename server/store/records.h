@@ -35,7 +35,8 @@ struct StoredJob {
     std::string process, job_hash, owner;
     JobStatus status;
     std::string message;
-    int progress;  // 0..100
+    int progress;                               // 0..100
+    std::optional<int64_t> relative_error_ppb;  // of its table so far, in units of 1e-9
     int64_t created;
     std::optional<int64_t> started, finished;
     int64_t updated;

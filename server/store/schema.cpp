@@ -72,6 +72,7 @@ CREATE TABLE checkpoints(
 ) STRICT, WITHOUT ROWID;
 CREATE INDEX checkpoints_sha256 ON checkpoints(sha256);
 )sql",
+    "ALTER TABLE jobs ADD COLUMN relative_error_ppb INTEGER",
 };
 
 int64_t version_of(Database& database) {

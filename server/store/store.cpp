@@ -155,10 +155,13 @@ uint64_t Store::wait_for_change(uint64_t seen, std::chrono::milliseconds timeout
 
 // A commit for every per cent of every job would keep the disk busy with what nobody needs after a crash: the
 // last word of each job is written with the next group.
-void Store::progress(const std::string& job_hash, int percent, const std::string& message) {
+void Store::progress(const std::string& job_hash, int percent, const std::string& message,
+                     int64_t relative_error_ppb) {
     {
         const std::lock_guard lock(pending_mutex_);
-        pending_.progress[job_hash] = {std::clamp(percent, 0, 100), message};
+        pending_.progress[job_hash] = {
+            std::clamp(percent, 0, 100), message,
+            relative_error_ppb > 0 ? std::optional(relative_error_ppb) : std::nullopt};
     }
     writer_.nudge();
 }
@@ -187,10 +190,11 @@ void Store::write_pending(Database& database) {
     }
     const int64_t at = now();
     for (const auto& [job_hash, state] : pending.progress)
-        Statement(database,
-                  "UPDATE jobs SET progress=?, message=?, updated=?, version=version+1 "
-                  "WHERE job_hash=? AND status='running'",
-                  state.first, state.second, at, job_hash)
+        Statement(
+            database,
+            "UPDATE jobs SET progress=?, message=?, relative_error_ppb=coalesce(?, relative_error_ppb), "
+            "updated=?, version=version+1 WHERE job_hash=? AND status='running'",
+            state.percent, state.message, state.relative_error_ppb, at, job_hash)
             .run();
     for (const std::string& sha256 : pending.surfaces)
         Statement(database, "UPDATE surfaces SET last_used=? WHERE sha256=?", at, sha256).run();

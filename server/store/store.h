@@ -16,7 +16,7 @@ namespace gonio {
 struct StoreOptions {
     std::string folder;                 // made if missing; on a local disk (SQLite's log needs shared memory)
     std::function<int64_t()> now = {};  // ms since the epoch; empty: the system's clock
-    int max_attempts = 5;               // computations of a job that may end with the process
+    int max_attempts = 20;  // computations of a job that may end with the process, without a new checkpoint
 };
 
 // Any thread may call anything. Errors of the disk are Error(io) naming the folder or the file; the store
@@ -51,11 +51,12 @@ class Store {
 
     // ---- the engine
 
-    // The oldest job whose hash nobody computes, now running. An equal job waits for that one's end and
-    // shares it.
+    // The oldest job whose hash nobody computes, now running; one that took the process down three times
+    // waits for the others. An equal job waits for that one's end and shares it.
     std::optional<ClaimedJob> next_job();
-    // To be seen soon, not at once, and not durable.
-    void progress(const std::string& job_hash, int percent, const std::string& message);
+    // To be seen soon, not at once, and not durable. relative_error_ppb: reached so far, 0 while unknown.
+    void progress(const std::string& job_hash, int percent, const std::string& message,
+                  int64_t relative_error_ppb = 0);
     bool stop_requested(const std::string& job_hash);
     // Replaces all checkpoints of the hash and ends all its jobs.
     void succeed(const std::string& job_hash, const std::vector<NewOutput>& outputs);
@@ -72,6 +73,7 @@ class Store {
 
     // ---- objects and surfaces
 
+    const std::string& folder() const { return folder_; }
     Objects& objects() { return objects_; }
     void put_surface(const StoredObject& object);
     bool has_surface(const std::string& sha256);
@@ -92,7 +94,12 @@ class Store {
 
   private:
     struct Pending {
-        std::map<std::string, std::pair<int, std::string>> progress;
+        struct Progress {
+            int percent;
+            std::string message;
+            std::optional<int64_t> relative_error_ppb;
+        };
+        std::map<std::string, Progress> progress;
         std::set<std::string> surfaces, results;
     };
     int64_t now() const { return now_(); }

@@ -29,15 +29,24 @@ constexpr std::array<Format, 6> formats{{
     {"text", ""sv, " .txt .csv .tsv .dat .asc ", read_text_matrix},
 }};
 
+// A file without an extension (the service names surfaces by their hash) can be a text matrix if it begins as
+// text.
+bool is_text(std::string_view bytes) {
+    const std::string_view head = bytes.substr(0, 4096);
+    return !head.empty() && std::all_of(head.begin(), head.end(), [](unsigned char c) {
+        return (c >= ' ' && c != 0x7f) || c == '\t' || c == '\n' || c == '\r';
+    });
+}
+
 const Format* find_format(const FileBytes& file) {
     for (const Format& format : formats)
         if (!format.signature.empty() && file.bytes.starts_with(format.signature)) return &format;
     std::string extension = std::filesystem::path(file.name).extension().string();
     for (char& c : extension)
         if (c >= 'A' && c <= 'Z') c += 'a' - 'A';
-    if (!extension.empty())
-        for (const Format& format : formats)
-            if (format.extensions.find(" " + extension + " ") != std::string_view::npos) return &format;
+    if (extension.empty()) return is_text(file.bytes) ? &formats.back() : nullptr;
+    for (const Format& format : formats)
+        if (format.extensions.find(" " + extension + " ") != std::string_view::npos) return &format;
     return nullptr;
 }
 

@@ -1,0 +1,20 @@
+// What a job will cost, said before it runs: from its settings and constants measured on other jobs. Rough by
+// nature: CPU time within a factor of 3 of what it then takes (tests/bench/run prints both).
+#pragma once
+#include "measure/reference.h"
+
+namespace gonio {
+
+struct Prediction {
+    double cpu_seconds = 0;   // of one thread
+    double memory_bytes = 0;  // at its peak
+    double table_bytes = 0;   // of values, standard errors and biases, as doubles
+};
+
+// max_bytes: RunOptions::max_bytes, to which runs are cut.
+Prediction predict_brdf(const HeightField& surface, const Material& material, const BrdfPlan& plan,
+                        long long max_bytes = RunOptions{}.max_bytes);
+Prediction predict_reference(const HeightField& surface, const Material& material, const BrdfPlan& plan,
+                             const ReferenceOptions& reference);
+
+}  // namespace gonio

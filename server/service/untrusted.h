@@ -1,0 +1,21 @@
+// Files of strangers in formats whose decoders have known holes. 15 published CVEs affect OpenEXR 3.1.5,
+// which Debian 12 ships without a fix for any of them: an uploaded EXR file is decoded by a child process
+// that may compute and write to one pipe, and do nothing else.
+#pragma once
+#include <string>
+
+#include "surface/io/height_reader.h"
+
+namespace gonio {
+
+inline constexpr ReadLimits untrusted_limits{1LL << 26, 1LL << 30};
+
+// A HeightReader: the formats above in a child of this very program (`gonio decode-untrusted`), the others
+// here. A child that breaks its limits or is killed is Error(invalid_input) naming the file.
+RawHeights read_untrusted_heights(const std::string& path);
+
+// The child's side: decodes the file after giving up everything else, writes the heights to standard output.
+// Returns the exit code.
+int decode_untrusted(const std::string& path);
+
+}  // namespace gonio

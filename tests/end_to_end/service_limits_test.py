@@ -1,0 +1,232 @@
+#!/usr/bin/env python3
+"""What the service refuses and to whom, and what an operator sees of it.
+
+Usage: service_limits_test.py GONIO SOURCE_FOLDER [unittest options]
+"""
+import hashlib
+import json
+import re
+import struct
+import subprocess
+import time
+import unittest
+
+from service_fixture import GONIO, GROOVE, JOB, LONG, MEASURE, Service
+
+ALICE, BOB = "alice-0123456789abcdef", "bob-0123456789abcdef"
+
+
+def exr(width, height, values):
+    """A scan-line OpenEXR file of one float channel, without compression."""
+    def attribute(name, kind, payload):
+        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(payload)) + payload
+    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
+    head = struct.pack("<ii", 20000630, 2) + attribute("channels", "chlist", b"Y\0" + struct.pack("<iiii", 2, 0, 1, 1) + b"\0")
+    head += attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box)
+    head += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
+    head += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)) + attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
+    lines = [struct.pack("<ii", y, 4 * width) + struct.pack(f"<{width}f", *values[y * width:(y + 1) * width]) for y in range(height)]
+    first = len(head) + 8 * height
+    return head + b"".join(struct.pack("<Q", first + k * len(lines[0])) for k in range(height)) + b"".join(lines)
+
+
+class Limits(Service):
+    def put(self, data):
+        digest = hashlib.sha256(data).hexdigest()
+        self.assertIn(self.call("PUT", f"/surfaces/{digest}", data)[0], (200, 201))
+        return digest
+
+    def refused(self, inputs, status, pointer, process="brdf"):
+        code, problem = self.call("POST", f"/processes/{process}/execution", {"inputs": inputs})
+        self.assertEqual(code, status, problem)
+        self.assertEqual(problem["errors"][0]["pointer"], pointer)
+        return problem["errors"][0]["detail"]
+
+    def test_too_large_says_what_would_fit(self):
+        self.restart("--max-job-seconds", "2", "--max-table-bytes", "100000")
+        detail = self.refused({**LONG, "measure": MEASURE}, 422, "/inputs/accuracy")
+        target = float(re.search(r"target_relative_error of (\S+) would fit", detail).group(1))
+        status, info = self.call("POST", "/processes/brdf/execution",
+                                 {"inputs": {**LONG, "measure": MEASURE, "accuracy": {"target_relative_error": target}}})
+        self.assertEqual(status, 201, info)
+        self.assertEqual(self.wait(info["jobID"])["status"], "successful")
+        self.assertIn("would fit", self.refused({**JOB, "measure": LONG["measure"]}, 422, "/inputs/measure"))
+        self.restart("--max-job-bytes", "70000000")
+        self.assertIn("resample", self.refused({**JOB, "surface": LONG["surface"]}, 422, "/inputs/surface"))
+
+    def test_job_is_stopped_after_its_time(self):
+        # Predicted by its budget, which is a wish: the limit is what ends it.
+        job = {**LONG, "accuracy": {"max_seconds": 0.9, "target_relative_error": 1e-6}}
+        self.restart("--max-job-seconds", "1")
+        slow = {**job, "surface": {**LONG["surface"], "samples": 2048}}
+        info = self.wait(self.submit(slow)["jobID"])
+        if info["status"] == "failed":
+            self.assertIn("1 s that this service allows", info["message"])
+            self.assertEqual(self.call("GET", f"/jobs/{info['jobID']}/results")[0], 422)
+        else:  # a machine that is done in time
+            self.assertEqual(info["status"], "successful")
+
+    def test_quotas_answer_429(self):
+        tokens = self.folder / "tokens"
+        tokens.write_text(f"alice {ALICE}\nbob {BOB}\n")
+        tokens.chmod(0o600)
+        self.restart("--token-file", str(tokens), "--max-jobs-per-token", "2", "--max-queue", "2")
+        jobs = []
+        for seed in (1, 2):
+            status, info = self.call("POST", "/processes/brdf/execution",
+                                     {"inputs": {**LONG, "accuracy": {"target_relative_error": 1e-6, "seed": seed}}},
+                                     Authorization=f"Bearer {ALICE}")
+            self.assertEqual(status, 201, info)
+            jobs.append(info["jobID"])
+        body = {"inputs": JOB}
+        status, problem = self.call("POST", "/processes/brdf/execution", body, Authorization=f"Bearer {ALICE}")
+        self.assertEqual((status, "unfinished" in problem["detail"]), (429, True), problem)
+        self.assertGreaterEqual(int(self.headers["Retry-After"]), 1)
+        # Another token has its own quota; one of alice's jobs runs, so that there is room in the queue.
+        status, info = self.call("POST", "/processes/brdf/execution", body, Authorization=f"Bearer {BOB}")
+        self.assertEqual(status, 201, info)
+        for job in jobs:
+            self.assertEqual(self.call("DELETE", f"/jobs/{job}", Authorization=f"Bearer {ALICE}")[0], 200)
+
+    def test_a_token_sees_its_own_jobs(self):
+        tokens = self.folder / "tokens"
+        tokens.write_text(f"alice {ALICE}\nbob {BOB}\n")
+        tokens.chmod(0o600)
+        self.restart("--token-file", str(tokens))
+        alice, bob = ({"Authorization": f"Bearer {token}"} for token in (ALICE, BOB))
+        info = self.submit(JOB, Prefer="wait=30", **alice)
+        self.assertEqual(info["owner"], "alice")
+        job = info["jobID"]
+        for path in ("", "/document", "/events", "/results", "/results/table"):
+            status, problem = self.call("GET", f"/jobs/{job}{path}", **bob)
+            self.assertEqual((status, problem["type"].rsplit("/", 1)[1]), (404, "no-such-job"), path)
+            self.assertEqual(self.call("GET", f"/jobs/{job}{path}", **alice)[0], 200, path)
+        self.assertEqual(self.call("DELETE", f"/jobs/{job}", **bob)[0], 404)
+        self.assertEqual(self.call("GET", "/jobs", **bob)[1]["jobs"], [])
+        self.assertEqual(len(self.call("GET", "/jobs", **alice)[1]["jobs"]), 1)
+
+    def test_filters_of_the_list(self):
+        job = self.submit(JOB, Prefer="wait=30")
+        def ids(query):
+            status, page = self.call("GET", f"/jobs?{query}")
+            self.assertEqual(status, 200, page)
+            return [entry["jobID"] for entry in page["jobs"]]
+        mine = [job["jobID"]]
+        created = job["created"]
+        self.assertEqual(ids(f"datetime={created}"), mine)
+        self.assertEqual(ids(f"datetime=../{created}"), mine)
+        self.assertEqual(ids(f"datetime={created}/.."), mine)
+        self.assertEqual(ids("datetime=../2001-01-01T00:00:00Z"), [])
+        self.assertEqual(ids("minDuration=3600"), [])
+        self.assertEqual(ids("maxDuration=3600&type=process&processID=brdf&status=successful,failed"), mine)
+        self.assertEqual(ids("processID=reference"), [])
+        for query in ("datetime=yesterday", "minDuration=-1", "type=thing", "status=done"):
+            self.assertEqual(self.call("GET", f"/jobs?{query}")[0], 400, query)
+
+    def test_statistics(self):
+        info = self.call("POST", "/processes/statistics/execution", {"inputs": {"surface": GROOVE}}, Prefer="wait=30")[1]
+        self.assertEqual(info["status"], "successful", info)
+        _, report = self.call("GET", f"/jobs/{info['jobID']}/results/report")
+        self.assertAlmostEqual(report["max_slope"], 1, places=5)
+        self.assertEqual(report["nx"], 16)
+        _, picture = self.call("GET", f"/jobs/{info['jobID']}/results/hillshade")
+        self.assertEqual(picture[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(struct.unpack(">II", picture[16:24])[0], 16)
+
+    def test_text_and_maps_by_hash(self):
+        rows = 8
+        text = "\n".join(" ".join(str((i % 4) * 1e-4) for i in range(rows)) for _ in range(rows)).encode()
+        image = b"Pf\n8 8\n-1.0\n" + struct.pack("<64f", *([0.25, 0.75] * 32))
+        inputs = {**JOB, "surface": {"sha256": self.put(text), "pitch": "1 mm", "height_scale": "1 m"},
+                  "material": {"model": "lambertian", "albedo": {"sha256": self.put(image)}}}
+        info = self.submit(inputs, Prefer="wait=30")
+        self.assertEqual(info["status"], "successful", info)
+        (self.folder / "heights.txt").write_bytes(text)
+        (self.folder / "map.pfm").write_bytes(image)
+        local = {**inputs, "surface": {**inputs["surface"], "file": "heights.txt"},
+                 "material": {"model": "lambertian", "albedo": {"file": "map.pfm"}}}
+        del local["surface"]["sha256"]
+        self.assertEqual(self.table(info["jobID"]), self.local(local))
+        detail = self.refused({**inputs, "material": {"model": "lambertian", "albedo": {"sha256": "0" * 64}}}, 400,
+                              "/inputs/material/albedo/sha256")
+        self.assertIn("was not uploaded", detail)
+
+    def test_exr_of_a_stranger(self):
+        data, surface = exr(8, 4, [1e-3 * (k % 8) for k in range(32)]), {"pitch": "1 mm", "height_scale": "1 m"}
+        (self.folder / "a.exr").write_bytes(data)
+        local = subprocess.run([GONIO, "info", "a.exr", "--pitch", "1mm", "--height-scale", "1m", "--json"], cwd=self.folder,
+                               check=True, capture_output=True, text=True)
+        status, answer = self.call("POST", "/processes/statistics/execution",
+                                   {"inputs": {"surface": {"sha256": self.put(data), **surface}}}, Prefer="wait=30")
+        self.assertEqual((status, answer.get("status")), (201, "successful"), answer)
+        report = self.call("GET", f"/jobs/{answer['jobID']}/results/report")[1]
+        self.assertEqual(report["surface_hash"], json.loads(local.stdout)["surface_hash"])
+        # What it cannot be used for is said in the words of the command line.
+        (self.folder / "b.exr").write_bytes(data[:-40])
+        local = subprocess.run([GONIO, "info", "b.exr", "--pitch", "1mm", "--height-scale", "1m"], cwd=self.folder,
+                               capture_output=True, text=True)
+        detail = self.refused({"surface": {"sha256": self.put(data[:-40]), **surface}}, 400, "/inputs", "statistics")
+        self.assertIn(local.stderr.strip().rsplit(": ", 1)[1], detail)
+        # Whatever a damaged file does to the decoder, the service lives and says so.
+        for k in range(0, min(len(data), 400), 7):
+            damaged = bytearray(data)
+            damaged[k] ^= 0x5A
+            status, _ = self.call("POST", "/processes/statistics/execution",
+                                  {"inputs": {"surface": {"sha256": self.put(bytes(damaged)), **surface}}})
+            self.assertIn(status, (201, 400, 422))
+        self.assertEqual(self.call("GET", "/healthz")[0], 200)
+
+    def test_metrics(self):
+        self.kill()
+        self.process = subprocess.Popen([GONIO, "serve", "--data", str(self.folder / "data"), "--listen", "127.0.0.1:0",
+                                         "--admin-listen", "127.0.0.1:0", "--threads", "1"],
+                                        stdout=subprocess.PIPE, text=True)
+        self.port = int(self.process.stdout.readline().rsplit(":", 1)[1])
+        service, self.admin = self.port, int(self.process.stdout.readline().rsplit(":", 1)[1])
+        self.submit(JOB, Prefer="wait=30")
+        self.assertEqual(self.call("GET", "/metrics")[0], 404)  # not for everybody
+        self.port = self.admin
+        end = time.monotonic() + 10
+        while True:  # a computation is counted just after its job has ended
+            status, text = self.call("GET", "/metrics")
+            if b'gonio_jobs_total{' in text or time.monotonic() > end:
+                break
+        self.assertEqual(status, 200)
+        lines = dict(line.rsplit(" ", 1) for line in text.decode().splitlines() if line and line[0] != "#")
+        self.assertEqual(lines['gonio_jobs_total{process="brdf",status="successful"}'], "1")
+        self.assertEqual(float(lines['gonio_http_requests_total{method="POST",route="/processes",status="201"}']), 1)
+        self.assertGreater(float(lines["process_resident_memory_bytes"]), 1e6)
+        self.assertEqual(self.call("GET", "/readyz")[0], 200)
+        self.port = service
+
+    def test_retention(self):
+        job = self.submit(JOB, Prefer="wait=30")["jobID"]
+        self.table(job)
+        self.kill()
+        report = json.loads(subprocess.run([GONIO, "store", "check", "--data", self.folder / "data"], check=True,
+                                           capture_output=True).stdout)
+        self.assertEqual(report["faults"], [])
+        subprocess.run([GONIO, "store", "export", job, "--data", self.folder / "data", "-o", self.folder / "copy"], check=True)
+        subprocess.run(["sha256sum", "--quiet", "-c", "SHA256SUMS"], cwd=self.folder / "copy", check=True)
+        self.assertEqual((self.folder / "copy/table.csv").read_bytes(), self.local(JOB))
+        damaged = next(path for path in (self.folder / "data/objects").rglob("*")
+                       if path.is_file() and path.stat().st_size == len(self.local(JOB)))
+        kept = damaged.read_bytes()
+        damaged.write_bytes(kept[:-1] + b"?")
+        self.assertEqual(subprocess.run([GONIO, "store", "check", "--data", self.folder / "data"],
+                                        capture_output=True).returncode, 1)
+        damaged.write_bytes(kept)
+        report = json.loads(subprocess.run([GONIO, "store", "gc", "--data", self.folder / "data", "--quota-bytes", "0"],
+                                           check=True, capture_output=True).stdout)
+        self.assertEqual((report["bytes_after"], report["results_removed"]), (0, 1))
+        self.start()
+        status, problem = self.call("GET", f"/jobs/{job}/results")
+        self.assertEqual(status, 410, problem)
+        self.assertIn("expires", self.call("GET", f"/jobs/{job}")[1])
+        again = self.submit(JOB, Prefer="wait=30")
+        self.assertEqual(self.table(again["jobID"]), self.local(JOB))
+        self.assertEqual(self.table(job), self.local(JOB))  # the old job has its results again
+
+
+if __name__ == "__main__":
+    unittest.main()
