@@ -13,7 +13,7 @@ class Local(unittest.TestCase):
     def test_progress(self):
         seen = []
         table = gonio.run(MEDIUM, program=GONIO, threads=1, progress=seen.append)
-        self.assertEqual(table.dims, ("incident", "outgoing", "channel"))
+        self.assertEqual(table.shape, (1, 1, 3, 1, 1))
         self.assertEqual(seen[-1].progress, 100)
         self.assertTrue(seen[-1].message)
 
@@ -44,7 +44,7 @@ class Local(unittest.TestCase):
             gonio.run(LONG, program=GONIO, timeout=0.3)
 
     def interrupted(self, number):
-        """Runs a long job and sends a signal once it reports progress."""
+        """Runs a job of some seconds and sends a signal once it reports progress."""
         started = []
 
         def popen(*arguments, **options):
@@ -53,7 +53,7 @@ class Local(unittest.TestCase):
 
         real = subprocess.Popen
         with mock.patch("gonio.local.subprocess.Popen", popen):
-            gonio.run(LONG, program=GONIO, progress=lambda status: started[0].send_signal(number))
+            gonio.run(MEDIUM, program=GONIO, progress=lambda status: started[0].send_signal(number))
 
     def test_interrupted(self):
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -71,5 +71,5 @@ class Local(unittest.TestCase):
 
         real = subprocess.Popen
         with mock.patch("gonio.local.subprocess.Popen", popen), self.assertRaises(ZeroDivisionError):
-            gonio.run(LONG, program=GONIO, progress=lambda status: 1 / 0)
+            gonio.run(MEDIUM, program=GONIO, progress=lambda status: 1 / 0)
         self.assertIsNotNone(started[0].returncode)
