@@ -1,5 +1,6 @@
 """Servers that refuse for a while, connections that break, bytes that change on the way."""
 import email.utils
+import hashlib
 import json
 import socket
 import time
@@ -101,11 +102,12 @@ class Answers(ServiceTest):
         closed = socket.create_server(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{closed.getsockname()[1]}"
         closed.close()
-        self.client(*[(200, {}, b"<html>")] * 99, )
-        for client in (gonio.Client(url, patience=2), gonio.Client("http://no.such.host.invalid", patience=2),
-                       gonio.Client(self.server.url, patience=2)):
+        for client in (gonio.Client(url, patience=2), gonio.Client("http://no.such.host.invalid", patience=2)):
             with self.assertRaises(gonio.Unreachable):
                 client.processes()
+        for garbage in ((200, {}, b"<html>"), (200, {"Content-Length": "99"}, b"{}"), b"no HTTP at all\r\n\r\n"):
+            with self.assertRaises(gonio.Unreachable):
+                self.client(*[garbage] * 99, patience=2).processes()
         garbage = self.client((302, {"Location": "/"}, b""), (404, {}, b"\xff not json"))
         for code in (302, 404):
             with self.assertRaises(gonio.ApiError) as caught:
@@ -133,6 +135,31 @@ class Answers(ServiceTest):
         client = self.client(reply(status("running"), 201), *[None] * 99)
         with mock.patch("gonio.job.time", self.clock), self.assertRaises(gonio.TimedOut):
             client.submit(JOB).wait(timeout=3)
+
+
+    def test_albedo_maps_are_uploaded(self):
+        maps = [self.folder / name for name in ("r.png", "g.png", "b.png")]
+        for path in maps:
+            path.write_text(path.name)
+        there, missing, put, done = (200, {}, b""), reply({}, 404), reply({}, 201), reply(status("accepted"), 201)
+        client = self.client(missing, put, done, there, missing, put, missing, put, done)
+        client.submit(JOB, material={"albedo": {"file": maps[0]}})
+        client.submit(JOB, material={"albedo": {"files": maps}})
+        names = [hashlib.sha256(path.name.encode()).hexdigest() for path in maps]
+        sent = [json.loads(body)["inputs"]["material"]["albedo"] for body in self.server.bodies if body.startswith(b"{")]
+        self.assertEqual(sent, [{"sha256": names[0]}, {"sha256": names}])
+        puts = [request for request, _ in self.server.requests if request.startswith("PUT")]
+        self.assertEqual(puts, [f"PUT /surfaces/{name}" for name in names])
+
+    def test_what_a_failed_job_says(self):
+        problem = {"code": "limit", "field": "", "message": "out of memory"}
+        client = self.client(reply(status("failed") | {"message": "out of memory", "problem": problem}), reply({"surface": {}}))
+        job = client.job("a")
+        with self.assertRaises(gonio.JobFailed) as caught:
+            job.wait()
+        self.assertEqual((str(caught.exception), caught.exception.problem), ("job a failed: out of memory", problem))
+        self.assertEqual(job.document(), {"surface": {}})
+        self.assertEqual(self.server.requests[-1][0], "GET /jobs/a/document")
 
 
 class Cuts(ServiceTest):

@@ -161,13 +161,14 @@ def _pump(source: socket.socket, sink: socket.socket) -> None:
 
 
 class Script(http.server.ThreadingHTTPServer):
-    """A server whose answers are the next of a list: (status, headers, body). Records the requests: (method and path,
-    headers). An answer of None closes the connection without one."""
+    """A server whose answers are the next of a list: (status, headers, body), or raw bytes. Records the requests
+    (method and path, headers) and their bodies. An answer of None closes the connection without one."""
 
-    def __init__(self, *answers: tuple[int, dict[str, str], bytes] | None) -> None:
+    def __init__(self, *answers: tuple[int, dict[str, str], bytes] | bytes | None) -> None:
         super().__init__(("127.0.0.1", 0), _ScriptHandler)
         self.answers = list(answers)
         self.requests: list[tuple[str, dict[str, str]]] = []
+        self.bodies: list[bytes] = []
         self.url = f"http://127.0.0.1:{self.server_address[1]}"
         self.thread = threading.Thread(target=self.serve_forever, kwargs={"poll_interval": 0.01})
         self.thread.start()
@@ -180,11 +181,14 @@ class Script(http.server.ThreadingHTTPServer):
 
 class _ScriptHandler(http.server.BaseHTTPRequestHandler):
     def answer(self) -> None:
-        self.rfile.read(int(self.headers.get("Content-Length", 0)))
+        self.server.bodies.append(self.rfile.read(int(self.headers.get("Content-Length", 0))))
         self.server.requests.append((f"{self.command} {self.path}", dict(self.headers)))
         answer = self.server.answers.pop(0)
         self.close_connection = True
         if answer is None:
+            return
+        if isinstance(answer, bytes):
+            self.wfile.write(answer)
             return
         status, headers, body = answer
         self.send_response(status)

@@ -13,7 +13,7 @@ from urllib.parse import urlencode
 import numpy as np
 import numpy.typing as npt
 
-from .document import JobDocument, document_text, read_document, write_array
+from .document import JobDocument, document_text, file_members, read_document, write_array
 from .errors import ApiError, Refused
 from .job import Job
 from .status import Progress, Status
@@ -67,7 +67,8 @@ class Client:
                **members: Any) -> Job:
         """Hands in a job: a document (a mapping or the path of a JSON file), members given by name, or both.
 
-        A surface given as a file or as an array (`grid`) is uploaded; `output` is left out, for files are fetched.
+        A surface given as a file or as an array (`grid`) is uploaded, and so are albedo maps; `output` is left out, for
+        outputs are fetched.
         However often this has to be tried, it makes one job. key: an Idempotency-Key of one's own: the same again,
         even from another process, is the same job. Raises ApiError with a pointer to what is wrong.
 
@@ -77,11 +78,13 @@ class Client:
         """
         document = read_document(job, members)
         document.pop("output", None)
-        surface = document.get("surface")
-        if isinstance(surface, dict):
-            for name in ("file", "grid"):
-                if isinstance(surface.get(name), (str, os.PathLike, np.ndarray)):
-                    surface |= self.upload(surface.pop(name))
+        for files in file_members(document):
+            for name in ("file", "files", "grid"):
+                value = files.get(name)
+                if isinstance(value, (str, np.ndarray)):
+                    files |= self.upload(files.pop(name))
+                elif name == "files" and isinstance(value, list):
+                    files["sha256"] = [self.upload(path)["sha256"] for path in files.pop(name)]
         info = self._transport.json("POST", f"processes/{process}/execution", json_body(document_text({"inputs": document})),
                                     {"Idempotency-Key": key or uuid.uuid4().hex})
         return Job(self._transport, Status.from_json(info))

@@ -30,10 +30,24 @@ def read_document(job: JobDocument | None, members: Mapping[str, Any]) -> dict[s
     else:
         folder = Path(job).resolve().parent
         document = {**_read_json(Path(job)), **members}
-    for name, read in (("surface", _absolute_surface), ("material", _absolute_material)):
+    for name in ("surface", "material"):
         if isinstance(document.get(name), Mapping):
-            document[name] = read(dict(document[name]), folder)
+            document[name] = dict(document[name])
+    if isinstance(document.get("material"), dict) and isinstance(document["material"].get("albedo"), Mapping):
+        document["material"]["albedo"] = dict(document["material"]["albedo"])
+    for files in file_members(document):
+        if isinstance(files.get("file"), (str, os.PathLike)):
+            files["file"] = str(folder / files["file"])
+        if isinstance(files.get("files"), (list, tuple)):
+            files["files"] = [str(folder / path) for path in files["files"]]
     return document
+
+
+def file_members(document: dict[str, Any]) -> list[dict[str, Any]]:
+    """The parts of a document that may name files: the surface and the albedo."""
+    material = document.get("material")
+    parts = [document.get("surface"), material.get("albedo") if isinstance(material, dict) else None]
+    return [part for part in parts if isinstance(part, dict)]
 
 
 def document_text(document: Any) -> str:
@@ -63,24 +77,6 @@ def _read_json(path: Path) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise Refused(f"{path}: a job document is a JSON object", "invalid_input")
     return document
-
-
-def _absolute_surface(surface: dict[str, Any], folder: Path) -> dict[str, Any]:
-    if isinstance(surface.get("file"), (str, os.PathLike)):
-        surface["file"] = str(folder / surface["file"])
-    return surface
-
-
-def _absolute_material(material: dict[str, Any], folder: Path) -> dict[str, Any]:
-    albedo = material.get("albedo")
-    if isinstance(albedo, Mapping):
-        albedo = dict(albedo)
-        if isinstance(albedo.get("file"), (str, os.PathLike)):
-            albedo["file"] = str(folder / albedo["file"])
-        if isinstance(albedo.get("files"), list):
-            albedo["files"] = [str(folder / name) for name in albedo["files"]]
-        material["albedo"] = albedo
-    return material
 
 
 def _plain(value: Any) -> Any:

@@ -57,12 +57,16 @@ class ApiError(Refused):
 
 
 class JobFailed(GonioError):
-    """The job was accepted, and its computation failed. job: its id ("" of a local run)."""
+    """The job was accepted, and its computation failed.
 
-    def __init__(self, message: str, job: str = "") -> None:
+    job: its id ("" of a local run). problem: what the program said: code, field, value, message, if it could.
+    """
+
+    def __init__(self, message: str, job: str = "", problem: Mapping[str, Any] | None = None) -> None:
         super().__init__(f"job {job} failed: {message}" if job else message)
         self.job = job
         self.message = message
+        self.problem = dict(problem or {})
 
 
 class JobDismissed(GonioError):

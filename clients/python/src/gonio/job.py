@@ -53,7 +53,7 @@ class Job:
             for status in self._follow(None if timeout is None else time.monotonic() + timeout):
                 show(status)
         if self.last.status == "failed":
-            raise JobFailed(self.last.message, self.id)
+            raise JobFailed(self.last.message, self.id, self.last.info.get("problem"))
         if self.last.status == "dismissed":
             raise JobDismissed(f"job {self.id} was cancelled")
         return self
@@ -61,6 +61,10 @@ class Job:
     def cancel(self) -> Status:
         """Stops the job and returns what became of it: one that had ended already stays as it is."""
         return self._seen(self._transport.json("DELETE", f"jobs/{self.id}"))
+
+    def document(self) -> dict[str, Any]:
+        """The job document as it was accepted: to look at, or to submit again with some members changed."""
+        return dict(self._transport.json("GET", f"jobs/{self.id}/document"))
 
     def outputs(self) -> list[Output]:
         """The files of a successful job. Raises ApiError while there are none."""

@@ -69,6 +69,7 @@ def _execute(command: list[str], progress: Progress, timeout: float | None) -> N
                     last_words = _follow(process.stderr, progress)
                 except BaseException:
                     process.terminate()
+                    process.wait()  # before its stderr is closed, so that it ends in its own way
                     raise
         finally:
             timer.cancel()
@@ -100,6 +101,6 @@ def _failure(code: int, answer: str, last_words: str) -> GonioError:
     if failure["code"] == "cancelled":
         return JobDismissed("the program was interrupted")
     if failure["code"] not in REFUSALS:
-        return JobFailed(failure["message"])
+        return JobFailed(failure["message"], problem=failure)
     pointer = failure["field"] if failure["field"].startswith("/") else ""
     return Refused(failure["message"].removeprefix(pointer).removeprefix(" = "), failure["code"], pointer)

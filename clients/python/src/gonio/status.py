@@ -3,7 +3,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, TextIO
 
 FINAL = ("successful", "failed", "dismissed")
@@ -23,7 +23,7 @@ class Status:
     progress: int = 0
     relative_error: float | None = None
     seconds_left: float | None = None
-    info: Mapping[str, Any] | None = None
+    info: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def from_json(cls, info: Mapping[str, Any]) -> Status:
