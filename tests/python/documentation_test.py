@@ -14,8 +14,8 @@ from support import GONIO, MATERIAL, MEASURE, ROOT, SURFACE, ServiceTest
 class Documentation(ServiceTest):
     def test_docstrings(self):
         client = gonio.Client(self.service.url)
-        names = {"gonio": gonio, "np": np, "url": self.service.url, "client": client, "program": GONIO, "surface": SURFACE,
-                 "material": MATERIAL, "measure": MEASURE,
+        names = {"gonio": gonio, "np": np, "url": self.service.url, "client": client, "program": GONIO,
+                 "surface": SURFACE, "material": MATERIAL, "measure": MEASURE,
                  "table": client.run(surface=SURFACE, material=MATERIAL, measure=MEASURE)}
         attempted = 0
         for module in pkgutil.iter_modules(gonio.__path__, "gonio."):
@@ -35,6 +35,6 @@ class Documentation(ServiceTest):
 
     def test_types(self):
         self.assertTrue((pathlib.Path(gonio.__file__).parent / "py.typed").exists())
-        result = subprocess.run(["/usr/bin/mypy", "--python-executable", sys.executable, "--cache-dir", str(self.folder)],
-                                cwd=ROOT / "clients/python", capture_output=True, text=True)
+        command = ["/usr/bin/mypy", "--python-executable", sys.executable, "--cache-dir", str(self.folder)]
+        result = subprocess.run(command, cwd=ROOT / "clients/python", capture_output=True, text=True)
         self.assertEqual(result.returncode, 0, result.stdout + result.stderr)

@@ -34,4 +34,5 @@ class OgcClients(ServiceTest):
         def curl(path, *options):
             return json.loads(subprocess.check_output(["curl", "-sSf", *options, f"{self.service.url}/{path}"]))
 
-        self.drive(curl, lambda path, request: curl(path, "-H", "Content-Type: application/json", "-d", json.dumps(request)))
+        json_type = ("-H", "Content-Type: application/json")
+        self.drive(curl, lambda path, request: curl(path, *json_type, "-d", json.dumps(request)))

@@ -20,10 +20,12 @@ def main() -> int:
         folder = pathlib.Path(name)
         shutil.copytree(CLIENT, folder / "source")
         environment = folder / "environment"
-        subprocess.run([sys.executable, "-m", "venv", "--system-site-packages", "--without-pip", environment], check=True)
+        venv = [sys.executable, "-m", "venv", "--system-site-packages", "--without-pip"]
+        subprocess.run([*venv, environment], check=True)
         python = environment / "bin/python"
         pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--no-input"]
-        subprocess.run([*pip, "wheel", "--no-build-isolation", "--no-index", "--no-deps", "-w", folder, folder / "source"], check=True)
+        subprocess.run([*pip, "wheel", "--no-build-isolation", "--no-index", "--no-deps", "-w", folder,
+                        folder / "source"], check=True)
         [wheel] = folder.glob("*.whl")
         subprocess.run([*pip, "--python", python, "install", "--no-index", wheel], check=True)
         where = subprocess.check_output([python, "-c", "import gonio; print(gonio.__file__)"], cwd=folder, text=True)

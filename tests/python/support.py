@@ -23,10 +23,11 @@ MEASURE = {"kind": "brdf", "incident": {"theta_deg": [0], "phi_deg": [0]},
 SURFACE = {"generate": "v_groove", "samples": 16, "period": "1 mm", "slope_deg": 45}
 JOB = {"surface": SURFACE, "material": MATERIAL, "measure": MEASURE}
 # Minutes of work, in many short runs: it reports progress, and ends soon when it is told to.
-LONG = JOB | {"surface": {"generate": "gaussian", "samples": 24, "pitch": "1 um", "correlation_length": "3 um", "rms_slope": 1},
+LONG = JOB | {"surface": {"generate": "gaussian", "samples": 24, "pitch": "1 um", "correlation_length": "3 um",
+                          "rms_slope": 1},
               "accuracy": {"samples": {"replicates": 4096}}}
 # Some seconds of the same.
-MEDIUM = LONG | {"accuracy": {"samples": {"replicates": 100}}}
+MEDIUM = LONG | {"accuracy": {"samples": {"replicates": 60}}}
 # The table has some 100 kB.
 LARGE = JOB | {"measure": MEASURE | {"incident": {"hemisphere": 40}, "outgoing": {"hemisphere": 40}},
                "accuracy": {"samples": {}}}

@@ -67,7 +67,8 @@ class Tables(unittest.TestCase):
     def test_pairs(self):
         table, rows = self.both({"pairs_deg": PAIRS})
         self.assertEqual((table.dims, table.shape), (("pair", "channel"), (4, 1)))
-        np.testing.assert_array_equal(np.stack([table.coords[name] for name in ("theta_i", "phi_i", "theta_o", "phi_o")], 1), PAIRS)
+        angles = [table.coords[name] for name in ("theta_i", "phi_i", "theta_o", "phi_o")]
+        np.testing.assert_array_equal(np.stack(angles, 1), PAIRS)
         np.testing.assert_array_equal(table.values[:, 0], rows["f_y"].astype(np.float32))
         # 356 degrees is nearest to 350, around the circle.
         near = table.sel(theta_i=29, phi_i=1, theta_o=41, phi_o=356, channel="y")

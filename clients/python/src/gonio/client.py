@@ -85,7 +85,8 @@ class Client:
                     files |= self.upload(files.pop(name))
                 elif name == "files" and isinstance(value, list):
                     files["sha256"] = [self.upload(path)["sha256"] for path in files.pop(name)]
-        info = self._transport.json("POST", f"processes/{process}/execution", json_body(document_text({"inputs": document})),
+        body = json_body(document_text({"inputs": document}))
+        info = self._transport.json("POST", f"processes/{process}/execution", body,
                                     {"Idempotency-Key": key or uuid.uuid4().hex})
         return Job(self._transport, Status.from_json(info))
 

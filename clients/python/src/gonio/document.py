@@ -62,7 +62,7 @@ def write_array(array: Any, file: BinaryIO, pointer: str = "") -> None:
     """Writes heights as .npy. Masked points become NaN, which the key `missing` of the surface is about."""
     heights = np.asarray(np.where(array.mask, np.nan, array.data) if isinstance(array, np.ma.MaskedArray) else array)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf" or heights.size == 0:
-        raise Refused(f"an array of {heights.dtype} with shape {heights.shape}: heights are a 2-D array of real numbers",
+        raise Refused(f"an array of {heights.dtype} with shape {heights.shape}: must be 2-D, of real numbers",
                       "invalid_input", pointer)
     if heights.dtype not in (np.float32, np.float64):
         heights = heights.astype(np.float64)

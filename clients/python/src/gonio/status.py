@@ -27,8 +27,8 @@ class Status:
 
     @classmethod
     def from_json(cls, info: Mapping[str, Any]) -> Status:
-        return cls(str(info["jobID"]), str(info["status"]), str(info.get("message") or ""), int(info.get("progress") or 0),
-                   info.get("relative_error"), info.get("seconds_left"), info)
+        return cls(str(info["jobID"]), str(info["status"]), str(info.get("message") or ""),
+                   int(info.get("progress") or 0), info.get("relative_error"), info.get("seconds_left"), info)
 
     @property
     def is_final(self) -> bool:

@@ -147,7 +147,7 @@ def _nearest(axis: str, values: npt.NDArray[Any], wanted: float | str) -> int:
 
 
 def _nearest_direction(angles: Sequence[npt.NDArray[np.float64]], wanted: Sequence[float]) -> int:
-    """The row nearest to (theta, phi), or to (theta_i, phi_i, theta_o, phi_o) with the squares of both distances added."""
+    """The row nearest to (theta, phi), or to (theta_i, phi_i, theta_o, phi_o): the squares of both distances add up."""
     distance = np.zeros(len(angles[0]))
     for k in range(0, len(angles), 2):
         row = _unit_vectors(angles[k], angles[k + 1])

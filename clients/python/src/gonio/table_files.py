@@ -48,11 +48,10 @@ def _parse_json(content: bytes) -> Table:
         raise InvalidTable(f"format {root['format']!r}: must be gonio-table")
     _check_version(root["version"])
     axes = {axis["name"]: axis["values"] for axis in root["axes"]}
-    pairs = root.get("pairs")
+    pairs = None if root.get("pairs") is None else np.array(root["pairs"], dtype=np.intp).reshape(-1, 2)
     stored = [np.array(root[name], dtype=np.float32) for name in ("values", "standard_error", "bias")]
     return make_table(stored, axes["channel"], len(axes["order"]), _directions(axes["incident"]),
-                      _directions(axes["outgoing"]), None if pairs is None else np.array(pairs, dtype=np.intp).reshape(-1, 2),
-                      root["quantity"]["unit"], dict(root["provenance"]))
+                      _directions(axes["outgoing"]), pairs, root["quantity"]["unit"], dict(root["provenance"]))
 
 
 def _directions(values: list[list[float]]) -> npt.NDArray[np.float64]:
