@@ -1,0 +1,19 @@
+"""Client of gonio, a virtual gonioreflectometer: height fields to BRDF tables, each value with its error.
+
+    Client      a server; Client.submit gives a Job, Job.wait(), Job.table() a Table
+    run         the same job by the program on this machine
+    read_table  a table from a CSV or JSON file
+    GonioError  what everything here raises; see gonio.errors for its kinds
+"""
+from .client import Client
+from .download import Output
+from .errors import (ApiError, ChecksumError, GonioError, InvalidTable, JobDismissed, JobFailed, Refused, TimedOut,
+                     Unreachable)
+from .job import Job
+from .local import run
+from .status import Status
+from .table import Table
+from .table_files import read_table
+
+__all__ = ["ApiError", "ChecksumError", "Client", "GonioError", "InvalidTable", "Job", "JobDismissed", "JobFailed",
+           "Output", "Refused", "Status", "Table", "TimedOut", "Unreachable", "read_table", "run"]
