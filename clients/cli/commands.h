@@ -20,6 +20,7 @@ void add_info(CLI::App& app, CommonOptions& common, Action& action);
 void add_reference(CLI::App& app, CommonOptions& common, Action& action);
 void add_shard(CLI::App& app, CommonOptions& common, Action& action);
 void add_merge(CLI::App& app, CommonOptions& common, Action& action);
+void add_dispatch(CLI::App& app, CommonOptions& common, Action& action);
 void add_serve(CLI::App& app, CommonOptions& common, Action& action);
 void add_plot(CLI::App& app, CommonOptions& common, Action& action);
 void add_ndf(CLI::App& app, CommonOptions& common, Action& action);

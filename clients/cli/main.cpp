@@ -69,6 +69,7 @@ int main(int argc, char** argv) {
     gonio::add_reference(app, common, action);
     gonio::add_shard(app, common, action);
     gonio::add_merge(app, common, action);
+    gonio::add_dispatch(app, common, action);
     gonio::add_serve(app, common, action);
     gonio::add_plot(app, common, action);
     gonio::add_ndf(app, common, action);
