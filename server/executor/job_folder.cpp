@@ -1,6 +1,6 @@
 #include "server/executor/job_folder.h"
 
-#include <charconv>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -25,8 +25,9 @@ void write_text(const std::string& path, const std::string& text) {
 void copy_inputs(json& document, const fs::path& origin, const fs::path& folder) {
     int n_copied = 0;
     const auto copy = [&](json& name) {
-        const std::string copied = "input-" + std::to_string(n_copied++);
         const fs::path from = origin / name.get<std::string>();
+        // Some formats are known by their extension alone.
+        const std::string copied = "input-" + std::to_string(n_copied++) + from.extension().string();
         write_path_atomically((folder / copied).string(), [&](const std::string& temporary) {
             std::error_code failure;
             fs::copy_file(from, temporary, fs::copy_options::overwrite_existing, failure);
@@ -46,6 +47,12 @@ void copy_inputs(json& document, const fs::path& origin, const fs::path& folder)
     }
 }
 
+// What decides, beside the processor, in which order OpenBLAS adds. Engines do not hand the environment on.
+std::string blas_kernels() {
+    const char* chosen = std::getenv("OPENBLAS_CORETYPE");
+    return chosen ? "export OPENBLAS_CORETYPE=" + shell_quoted(chosen) + "\n" : "";
+}
+
 std::string script_of(const JobFolder& folder, const LoadedJob& job, const ShardCommand& command,
                       const RunOptions& options) {
     std::string shard =
@@ -56,7 +63,8 @@ std::string script_of(const JobFolder& folder, const LoadedJob& job, const Shard
     if (job.reference) shard += " --reference " + std::to_string(job.reference->paths);
     return R"(#!/bin/sh
 # Computes one shard: run INDEX, or run LIST LINE for the number in that line of a list.
-if [ $# = 2 ]; then index=$(sed -n "$2p" "$1"); else index=$1; fi
+)" + blas_kernels() +
+           R"(if [ $# = 2 ]; then index=$(sed -n "$2p" "$1"); else index=$1; fi
 cd )" + shell_quoted(folder.dispatch()) +
            R"( || exit 1
 for pause in 1 2 4 8 16 32 0; do

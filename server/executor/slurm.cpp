@@ -60,6 +60,11 @@ std::optional<int> attempt_of(const json& task, const JobFolder& job) {
     return attempt;
 }
 
+bool is_stuck(const json& task) {
+    const auto why = task.find("state_description");
+    return why != task.end() && why->is_string() && *why == "launch failed requeued held";
+}
+
 // All jobs of this user. SLURM_BITSTR_LEN: lists of waiting tasks are else cut after 64 characters.
 std::optional<std::vector<SlurmTasks>> queued_tasks(const JobFolder& job) {
     const CommandResult squeue =
@@ -74,12 +79,14 @@ std::optional<std::vector<SlurmTasks>> queued_tasks(const JobFolder& job) {
 std::optional<std::vector<SlurmTasks>> find_slurm_tasks(const std::string& answer, const JobFolder& job) {
     try {
         std::vector<SlurmTasks> found;
-        for (const json& task : json::parse(answer).at("jobs")) {
+        const json root = json::parse(answer);
+        for (const json& task : root.at("jobs")) {
             const std::optional<int> attempt = attempt_of(task, job);
             if (!attempt || is_over(task.at("job_state"))) continue;
             const std::optional<int> position = array_position(task.at("array_task_id"));
             found.push_back({task.at("job_id"), *attempt,
-                             position ? std::vector{*position} : expanded(task.at("array_task_string"))});
+                             position ? std::vector{*position} : expanded(task.at("array_task_string")),
+                             is_stuck(task)});
         }
         return found;
     } catch (const std::exception&) {  // cut short, or not what squeue prints
@@ -114,6 +121,7 @@ std::optional<std::set<int>> SlurmExecutor::poll(const JobFolder& job) {
     if (!tasks) return std::nullopt;
     std::set<int> shards;
     for (const SlurmTasks& found : *tasks) {
+        if (found.is_stuck) continue;
         const std::vector<int> indices = job.submitted(found.attempt);
         for (const int position : found.positions)
             if (position >= 1 && position <= static_cast<int>(indices.size()))

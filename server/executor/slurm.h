@@ -26,6 +26,7 @@ struct SlurmTasks {
     long long job_id = 0;
     int attempt = 0;
     std::vector<int> positions;  // lines of the submission's list, from 1
+    bool is_stuck = false;       // its node could not start it, and Slurm will not try again by itself
 };
 // Those of the job that are not over. Nothing if it is no answer of squeue. Reads what 22.05 and later print.
 std::optional<std::vector<SlurmTasks>> find_slurm_tasks(const std::string& answer, const JobFolder& job);
