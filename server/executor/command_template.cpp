@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <map>
 #include <sstream>
 
 #include "base/error.h"
@@ -19,7 +19,7 @@ constexpr double default_poll_seconds = 5;
 // A submission must name its shards by one of them.
 constexpr const char* submit_words[] = {"{list}", "{indices}", "{index}"};
 
-using Values = std::map<std::string, std::string>;
+using Values = CommandTemplateExecutor::Values;
 
 // Replaces {word} where the word is known. Other braces are the shell's own: ${x}, {1..3}, awk's.
 std::string filled(const std::string& command, const Values& values) {
@@ -36,15 +36,6 @@ std::string filled(const std::string& command, const Values& values) {
         }
     }
     return text;
-}
-
-Values values_of(const JobFolder& job, const ExecutorOptions& options) {
-    return {{"name", job.name()},
-            {"folder", shell_quoted(job.dispatch())},
-            {"run", shell_quoted(job.script())},
-            {"job", shell_quoted(job.document())},
-            {"at_once", std::to_string(options.at_once)},
-            {"threads", std::to_string(options.threads)}};
 }
 
 void run_or_throw(const std::string& member, const std::string& command, const Values& values) {
@@ -71,7 +62,7 @@ nlohmann::json read_templates(const std::string& path) {
 }  // namespace
 
 CommandTemplateExecutor::CommandTemplateExecutor(const std::string& path, const ExecutorOptions& options)
-    : options_(options) {
+    : here_(shell_quoted(std::filesystem::absolute(path).parent_path().string())), options_(options) {
     const nlohmann::json file = read_templates(path);
     const JsonNode root(file, path + "#");
     root.allow_keys({"submit", "poll", "cancel", "poll_seconds"});
@@ -86,8 +77,18 @@ CommandTemplateExecutor::CommandTemplateExecutor(const std::string& path, const 
         std::lround(1000 * (seconds ? seconds->number(0.01, 3600) : default_poll_seconds)));
 }
 
+CommandTemplateExecutor::Values CommandTemplateExecutor::values_of(const JobFolder& job) const {
+    return {{"name", job.name()},
+            {"folder", shell_quoted(job.dispatch())},
+            {"run", shell_quoted(job.script())},
+            {"job", shell_quoted(job.document())},
+            {"here", here_},
+            {"at_once", std::to_string(options_.at_once)},
+            {"threads", std::to_string(options_.threads)}};
+}
+
 void CommandTemplateExecutor::submit(const JobFolder& job, const Submission& submission) {
-    Values values = values_of(job, options_);
+    Values values = values_of(job);
     values["list"] = shell_quoted(job.list(submission.attempt));
     values["count"] = std::to_string(submission.indices.size());
     values["indices"] = joined(submission.indices);
@@ -100,7 +101,7 @@ void CommandTemplateExecutor::submit(const JobFolder& job, const Submission& sub
 }
 
 std::optional<std::set<int>> CommandTemplateExecutor::poll(const JobFolder& job) {
-    const CommandResult result = run_command(filled(poll_, values_of(job, options_)), limit);
+    const CommandResult result = run_command(filled(poll_, values_of(job)), limit);
     if (result.exit_code != 0) return std::nullopt;
     std::set<int> shards;
     std::istringstream in(result.output);
@@ -111,7 +112,7 @@ std::optional<std::set<int>> CommandTemplateExecutor::poll(const JobFolder& job)
 }
 
 void CommandTemplateExecutor::cancel(const JobFolder& job) {
-    run_or_throw("cancel", cancel_, values_of(job, options_));
+    run_or_throw("cancel", cancel_, values_of(job));
 }
 
 }  // namespace gonio

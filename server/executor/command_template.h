@@ -1,5 +1,7 @@
 // Shards on any other engine, through three shell commands of a JSON file (examples in deploy/executors).
 #pragma once
+#include <map>
+
 #include "server/executor/executor.h"
 
 namespace gonio {
@@ -18,10 +20,13 @@ namespace gonio {
 //                       {folder}   the job's folder (job_folder.h: where lists and logs lie)
 //                       {run}      the script: {run} INDEX, or {run} LIST LINE
 //                       {job}      the job document
+//                       {here}     the folder of the file of templates
 //                       {at_once}  at most so many at a time, 0: any number; {threads} of each shard
 // Paths come quoted for the shell.
 class CommandTemplateExecutor : public Executor {
   public:
+    using Values = std::map<std::string, std::string>;  // words of the templates
+
     // Throws Error(not_found), Error(invalid_input) naming the file and the member.
     CommandTemplateExecutor(const std::string& path, const ExecutorOptions& options);
 
@@ -31,7 +36,9 @@ class CommandTemplateExecutor : public Executor {
     std::chrono::milliseconds poll_interval() const override { return poll_interval_; }
 
   private:
-    std::string submit_, poll_, cancel_;
+    Values values_of(const JobFolder& job) const;
+
+    std::string here_, submit_, poll_, cancel_;
     std::chrono::milliseconds poll_interval_;
     ExecutorOptions options_;
 };

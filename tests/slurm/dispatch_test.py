@@ -2,6 +2,7 @@
 
 Usage: dispatch_test.py PROGRAM [TEST...]
 """
+import contextlib
 import os
 import pathlib
 import shutil
@@ -15,6 +16,8 @@ import unittest
 from cluster import Cluster, wait_until
 
 PROGRAM = ""
+# Clusters that run. unittest leaves out its clean-ups on Ctrl-C, this does not.
+EVERYTHING = contextlib.ExitStack()
 
 JOB = """{"surface": {"generate": "gaussian", "samples": 48, "pitch": "10 um", "correlation_length": "15 um", "rms_slope": 1.5},
  "material": {"model": "lambertian", "albedo": 0.8},
@@ -38,8 +41,10 @@ class DispatchTest(unittest.TestCase):
         # Short and readable to all: munge's socket lies in it.
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="gonio-slurm-"))
         self.folder.chmod(0o755)
-        self.addCleanup(shutil.rmtree, self.folder, ignore_errors=True)
-        self.cluster = self.enterContext(Cluster(self.folder))
+        stack = EVERYTHING.enter_context(contextlib.ExitStack())
+        self.addCleanup(stack.close)
+        stack.callback(shutil.rmtree, self.folder, ignore_errors=True)
+        self.cluster = stack.enter_context(Cluster(self.folder))
         (self.folder / "job.json").write_text(JOB, encoding="utf-8")
         subprocess.run([PROGRAM, "run", "job.json", "-q", "-o", "expected"], cwd=self.folder, check=True, timeout=600)
         self.gate = self.folder / "gate"
@@ -63,7 +68,7 @@ class DispatchTest(unittest.TestCase):
         process = subprocess.Popen([PROGRAM, "dispatch", "job.json", "--executor", "slurm", "--checkpoints", "shared", "-o", "out",
                                     "--program", str(self.folder / "gated")], cwd=self.folder, env=self.cluster.environment,
                                    stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-        self.addCleanup(process.communicate)
+        self.addCleanup(process.__exit__, None, None, None)
         self.addCleanup(process.kill)
         return process
 
@@ -158,4 +163,6 @@ if __name__ == "__main__":
     PROGRAM = sys.argv.pop(1)
     for index, name in enumerate(sys.argv[1:], 1):
         sys.argv[index] = f"DispatchTest.{name}"
-    unittest.main(verbosity=2)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with EVERYTHING:
+        unittest.main(verbosity=2)

@@ -225,11 +225,11 @@ TEST_F(TemplateTest, WordsAreFilledIn) {
     const JobFolder job = folder();
     const auto engine = executor(
         R"({"submit": "printf '%s|' {name} {attempt} {count} {indices} {list} {run} {folder} {job} {at_once} )"
-        R"({threads} ${HOME} {other} > {folder}/submitted", "poll": "echo 4; echo 9 30", "cancel": "touch {folder}/{name}"})");
+        R"({threads} {here} ${HOME} {other} > {folder}/submitted", "poll": "echo 4; echo 9 30", "cancel": "touch {folder}/{name}"})");
     engine->submit(job, job.new_submission({4, 9, 30}));
     EXPECT_EQ(read(job.dispatch() + "/submitted"),
               job.name() + "|1|3|4,9,30|" + job.list(1) + "|" + job.script() + "|" + job.dispatch() + "|" +
-                  job.document() + "|3|2|" + std::getenv("HOME") + "|{other}|");
+                  job.document() + "|3|2|" + root.string() + "|" + std::getenv("HOME") + "|{other}|");
     EXPECT_EQ(engine->poll(job), (std::set{4, 9, 30}));
     engine->cancel(job);
     EXPECT_TRUE(std::filesystem::exists(job.dispatch() + "/" + job.name()));
