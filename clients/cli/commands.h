@@ -21,6 +21,7 @@ void add_reference(CLI::App& app, CommonOptions& common, Action& action);
 void add_shard(CLI::App& app, CommonOptions& common, Action& action);
 void add_merge(CLI::App& app, CommonOptions& common, Action& action);
 void add_decode_untrusted(CLI::App& app, Action& action);
+void add_dispatch(CLI::App& app, CommonOptions& common, Action& action);
 void add_serve(CLI::App& app, CommonOptions& common, Action& action);
 void add_remote_commands(CLI::App& app, CommonOptions& common, Action& action);
 void add_store(CLI::App& app, CommonOptions& common, Action& action);

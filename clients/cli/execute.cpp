@@ -26,14 +26,18 @@ std::string read_text(const std::string& path) {
     return text;
 }
 
-Job read_job(const std::string& path) {
-    if (path == "-") return parse_job(read_text(path), {});
+JobOrigin origin_of(const std::string& path) {
+    if (path == "-") return {};
     const std::filesystem::path file(path);
-    return parse_job(read_text(path), {file.stem().string(), file.parent_path().string()});
+    return {file.stem().string(), file.parent_path().string()};
+}
+
+Job read_job(const std::string& path) {
+    return parse_job(read_text(path), origin_of(path));
 }
 
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
-                     const CommonOptions& common, const ShardTask& task) {
+                     const CommonOptions& common, const ShardTask& task, const RunJob& run) {
     Monitor monitor;
     monitor.cancel_requested = &interrupt_requested();
     ProgressBar bar(common.quiet);
@@ -42,11 +46,20 @@ Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& 
     RunOptions options = common.run_options();
     options.shard_task = task;
     if (!common.checkpoints.empty()) options.checkpoints = &checkpoints;
-    const BrdfResult result = run_job(loaded, options, monitor);
+    const BrdfResult result = run(loaded, options, monitor);
     monitor.check_cancelled();
     write_outputs(result.table, files);
     if (!common.checkpoints.empty()) checkpoints.remove_all();
     return result.report;
+}
+
+void print_result(const LoadedJob& loaded, const Report& report, const std::vector<OutputRequest>& files,
+                  const CommonOptions& common) {
+    if (!common.quiet) {
+        print_report(report, std::cerr);
+        for (const OutputRequest& file : files) std::cerr << "wrote " << file.path << std::endl;
+    }
+    if (common.json) std::cout << result_json(loaded, report, files) << std::endl;
 }
 
 int execute_job(const Job& job, const CommonOptions& common,
@@ -59,11 +72,7 @@ int execute_job(const Job& job, const CommonOptions& common,
     }
     const std::vector<OutputRequest> files = output_files(loaded, common.folder);
     const Report report = run_and_write(loaded, files, common);
-    if (!common.quiet) {
-        print_report(report, std::cerr);
-        for (const OutputRequest& file : files) std::cerr << "wrote " << file.path << std::endl;
-    }
-    if (common.json) std::cout << result_json(loaded, report, files) << std::endl;
+    print_result(loaded, report, files, common);
     return 0;
 }
 

@@ -1,5 +1,6 @@
 // Running one job for a person: what `run`, `measure`, `reference` and `batch` have in common.
 #pragma once
+#include <functional>
 #include <string>
 
 #include "clients/cli/options.h"
@@ -9,6 +10,7 @@ namespace gonio {
 
 // Reads a job file ("-": stdin) and parses it; relative inputs are looked up beside it.
 Job read_job(const std::string& path);
+JobOrigin origin_of(const std::string& path);
 
 // The text of a file ("-": stdin). Throws Error(not_found), Error(io).
 std::string read_text(const std::string& path);
@@ -20,8 +22,14 @@ int execute_job(const Job& job, const CommonOptions& common,
 
 // The part of it behind loading: runs with a progress bar and writes the outputs. task: which shards are
 // computed (measure/shards.h, which says what is thrown), --checkpoints is where the others are found.
+// run: what computes the result, if not this process.
+using RunJob = std::function<BrdfResult(const LoadedJob&, const RunOptions&, const Monitor&)>;
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
-                     const CommonOptions& common, const ShardTask& task = {});
+                     const CommonOptions& common, const ShardTask& task = {}, const RunJob& run = run_job);
+
+// Says what was done and written.
+void print_result(const LoadedJob& loaded, const Report& report, const std::vector<OutputRequest>& files,
+                  const CommonOptions& common);
 
 // 1 failed, 2 wrong usage, 3 invalid input, 4 server unreachable, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
 int exit_code(ErrorCode code);

@@ -70,6 +70,7 @@ int main(int argc, char** argv) {
     gonio::add_reference(app, common, action);
     gonio::add_shard(app, common, action);
     gonio::add_merge(app, common, action);
+    gonio::add_dispatch(app, common, action);
     gonio::add_serve(app, common, action);
     gonio::add_decode_untrusted(app, action);
     gonio::add_remote_commands(app, common, action);

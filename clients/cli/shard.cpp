@@ -7,7 +7,6 @@
 #include "clients/cli/commands.h"
 #include "clients/cli/console.h"
 #include "clients/cli/execute.h"
-#include "server/result_json.h"
 
 namespace gonio {
 namespace {
@@ -48,11 +47,7 @@ int merge_shards(const ShardedJob& sharded, const CommonOptions& common) {
     const std::vector<OutputRequest> files = output_files(loaded, common.folder);
     try {
         const Report report = run_and_write(loaded, files, common, {ShardTask::Kind::compute_none, 0});
-        if (!common.quiet) {
-            print_report(report, std::cerr);
-            for (const OutputRequest& file : files) std::cerr << "wrote " << file.path << std::endl;
-        }
-        if (common.json) std::cout << result_json(loaded, report, files) << std::endl;
+        print_result(loaded, report, files, common);
     } catch (const MissingShards& missing) {
         print_missing(missing);
         if (!common.quiet) print_warning("these shards are not there yet");

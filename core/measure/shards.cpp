@@ -3,13 +3,10 @@
 #include <algorithm>
 
 namespace gonio {
-namespace {
 
 std::string shard_key(int index) {
     return "shard-" + std::to_string(index);
 }
-
-}  // namespace
 
 MissingShards::MissingShards(std::vector<int> which) : indices_(std::move(which)) {
     text_ = "shards that are not there yet:";

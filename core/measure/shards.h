@@ -20,6 +20,9 @@ class Checkpoints {
     virtual void save(const std::string& key, const std::string& bytes) = 0;
 };
 
+// The key of a shard.
+std::string shard_key(int index);
+
 // What a process does about shards that are not there yet.
 struct ShardTask {
     enum class Kind { compute_all, compute_one, compute_none };
