@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
+#include <filesystem>
 #include <csignal>
 #include <iostream>
 #include <memory>
@@ -22,6 +23,8 @@ using namespace std::chrono_literals;
 struct ServeOptions {
     std::string listen = "127.0.0.1:8080", admin_listen, data, token_file;
     ServiceLimits limits;
+    std::string executor, shared_folder;
+    ExecutorOptions shards;
 };
 
 struct Address {
@@ -92,7 +95,14 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     server_limits.event_streams = serve.limits.event_streams;
     http::GuardedServer server(server_limits, hooks), admin;
     const Api api(store, server, serve.limits, times);
-    EngineOptions options{common.run_options(), serve.limits, {}};
+    EngineOptions options;
+    options.run = common.run_options();
+    options.limits = serve.limits;
+    if (!serve.executor.empty()) {
+        options.executor = make_executor(serve.executor, serve.shards);
+        options.shared_folder = serve.shared_folder.empty() ? serve.data + "/shards" : serve.shared_folder;
+        options.shard_command = {std::filesystem::read_symlink("/proc/self/exe").string(), serve.shards.threads};
+    }
     options.on_end = [&](const std::string& process, const std::string& status, double seconds) {
         metrics.count_job(process, status, seconds);
     };
@@ -127,6 +137,13 @@ void add_serve(CLI::App& app, CommonOptions& common, Action& action) {
     command->add_option("--token-file", options->token_file, "Bearer tokens, one NAME TOKEN a line");
     command->add_option("--admin-listen", options->admin_listen,
                         "Address of /metrics, /healthz, /readyz; no token");
+    command
+        ->add_option("--executor", options->executor,
+                     "Where shards are computed: local, slurm, or a file of command templates (default: in this process)")
+        ->group("Other machines");
+    command->add_option("--shared-folder", options->shared_folder, "Folder that all machines see (default: DATA/shards)")
+        ->group("Other machines");
+    command->add_option("--shard-threads", options->shards.threads, "Threads of each shard")->group("Other machines");
     ServiceLimits& limits = options->limits;
     const auto limit = [&](const char* flag, auto& value, const char* help) {
         command->add_option(flag, value, help)->capture_default_str()->group("Limits");

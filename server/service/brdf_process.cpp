@@ -2,6 +2,7 @@
 // tracer that judges it.
 #include <filesystem>
 
+#include "server/executor/dispatch.h"
 #include "server/json_node.h"
 #include "server/result_json.h"
 #include "server/service/processes.h"
@@ -40,9 +41,21 @@ std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, c
     return outputs;
 }
 
+// Here, or shard by shard on other machines: the same bits.
+BrdfResult compute(const LoadedJob& loaded, const std::string& document, const Workplace& place) {
+    if (!place.executor || !can_be_dispatched(loaded))
+        return run_job(loaded, place.options, place.monitor);
+    const JobFolder folder(place.shared_folder, loaded, document, "/", place.shard_command, place.options);
+    BrdfResult result = dispatch(loaded, folder, *place.executor, place.options, place.monitor, place.ending);
+    std::error_code ignored;  // costs room, no correctness
+    std::filesystem::remove_all(folder.job(), ignored);
+    return result;
+}
+
 PreparedJob prepare(json document, std::optional<ReferenceOptions> reference, Objects& objects) {
     const UploadedFiles files = resolve_uploads(document, objects);
-    Job job = parse_job(files.document.dump(), {});
+    const std::string text = files.document.dump();
+    Job job = parse_job(text, {});
     read_as_untrusted(job);
     const auto loaded = std::make_shared<const LoadedJob>(load_job(job, reference));
     const auto& plan = std::get<BrdfPlan>(loaded->job.plan);
@@ -60,10 +73,10 @@ PreparedJob prepare(json document, std::optional<ReferenceOptions> reference, Ob
             return predict_brdf(loaded->surface.surface, loaded->material, coarser);
         };
     }
-    prepared.run = [loaded](Objects& store, const RunOptions& options, const Monitor& monitor) {
-        const BrdfResult result = run_job(*loaded, options, monitor);
-        monitor.check_cancelled();
-        return make_outputs(store, *loaded, result);
+    prepared.run = [loaded, text](const Workplace& place) {
+        const BrdfResult result = compute(*loaded, text, place);
+        place.monitor.check_cancelled();
+        return make_outputs(place.objects, *loaded, result);
     };
     return prepared;
 }

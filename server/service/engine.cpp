@@ -125,9 +125,10 @@ void Engine::compute(const ClaimedJob& claimed) {
     try {
         const PreparedJob job = prepare(claimed, store_.objects());
         StoredCheckpoints checkpoints(store_, hash);
-        RunOptions run = options_.run;
-        run.checkpoints = &checkpoints;
-        store_.succeed(hash, job.run(store_.objects(), run, monitor));
+        Workplace place{store_.objects(),         options_.run,           monitor, options_.executor.get(),
+                        options_.shared_folder, options_.shard_command, &ending_};
+        place.options.checkpoints = &checkpoints;
+        store_.succeed(hash, job.run(place));
     } catch (const Error& error) {
         failure = error;
     } catch (const std::bad_alloc&) {

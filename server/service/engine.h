@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "measure/plan.h"
+#include "server/executor/executor.h"
 #include "server/service/job_times.h"
 #include "server/service/limits.h"
 #include "server/store/store.h"
@@ -15,6 +16,10 @@ namespace gonio {
 struct EngineOptions {
     RunOptions run;  // checkpoints are the store's
     ServiceLimits limits;
+    // Set to compute on other machines (Workplace).
+    std::shared_ptr<Executor> executor = {};
+    std::string shared_folder = {};
+    ShardCommand shard_command = {};
     // After every computation, with how it ended: a status of the job, or "released".
     std::function<void(const std::string& process, const std::string& status, double seconds)> on_end;
 };

@@ -10,6 +10,7 @@
 #include "base/monitor.h"
 #include "measure/plan.h"
 #include "measure/prediction.h"
+#include "server/executor/executor.h"
 #include "server/store/store.h"
 
 namespace gonio {
@@ -24,6 +25,18 @@ struct ProcessOutput {
     std::vector<OutputFormat> formats;  // stored as outputs "name.suffix"
 };
 
+// Where and with what a job is computed.
+struct Workplace {
+    Objects& objects;
+    RunOptions options;
+    const Monitor& monitor;
+    // Of the shards, where jobs are computed elsewhere; null: in this process.
+    Executor* executor = nullptr;
+    std::string shared_folder;  // that all machines see
+    ShardCommand shard_command;
+    const std::atomic<bool>* ending = nullptr;  // the service ends: shards stay in their queue
+};
+
 // A job that was checked and whose surface is in memory.
 struct PreparedJob {
     std::string job_hash;
@@ -33,8 +46,7 @@ struct PreparedJob {
     std::function<Prediction(double target)> at_target;
     double target = 0;
     // Every output in every format. Throws Error, also cancelled.
-    std::function<std::vector<NewOutput>(Objects& objects, const RunOptions& options, const Monitor& monitor)>
-        run;
+    std::function<std::vector<NewOutput>(const Workplace&)> run;
 };
 
 struct ServiceProcess {

@@ -23,10 +23,10 @@ PreparedJob prepare(const json& document, Objects& objects) {
     // there.
     prepared.job_hash = sha256_hex("statistics\n" + program_version() + "\n" + report);
     prepared.surfaces = files.surfaces;
-    prepared.run = [surface, report](Objects& store, const RunOptions&, const Monitor&) {
+    prepared.run = [surface, report](const Workplace& place) {
         return std::vector<NewOutput>{
-            {"report.json", "application/json", store.put(report)},
-            {"hillshade.png", "image/png", store.put(hillshade_png(surface->surface))}};
+            {"report.json", "application/json", place.objects.put(report)},
+            {"hillshade.png", "image/png", place.objects.put(hillshade_png(surface->surface))}};
     };
     return prepared;
 }
