@@ -10,6 +10,7 @@
 #include "server/http/bearer.h"
 #include "server/service/api.h"
 #include "server/service/engine.h"
+#include "server/service/page.h"
 
 namespace gonio {
 namespace {
@@ -40,7 +41,8 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     Store store({serve.data});
     http::ServerHooks hooks;
     hooks.gate = [&](const http::Request& request) {
-        if (tokens && request.target != "/healthz" && request.target != "/readyz")
+        if (tokens && request.target != "/healthz" && request.target != "/readyz" &&
+            !is_page_request(request))
             static_cast<void>(tokens->demand(request));
     };
     hooks.report = [](const http::Request& request, const std::string& text) {
@@ -54,6 +56,7 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     pthread_sigmask(SIG_BLOCK, &signals, nullptr);
     http::GuardedServer server({}, hooks);
     const Api api(store, server, {});
+    add_page(server);
     std::optional<Engine> engine;
     engine.emplace(store, EngineOptions{common.threads, common.run_options().max_bytes});
     std::cout << "listening on http://" << host << ":" << server.listen(host, port) << std::endl;

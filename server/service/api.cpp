@@ -10,6 +10,7 @@
 #include "server/http/negotiate.h"
 #include "server/job_hash.h"
 #include "server/service/engine.h"
+#include "server/service/page.h"
 #include "server/service/processes.h"
 
 namespace gonio {
@@ -118,7 +119,8 @@ Api::Api(Store& store, http::GuardedServer& server, const ApiLimits& limits)
 }
 
 void Api::add_documents(http::GuardedServer& server) {
-    server.route("GET", "/", [](Request&) {
+    server.route("GET", "/", [](Request& request) {
+        if (is_page_request(request)) return to_page();
         return json_response(
             200, {{"title", "gonio"},
                   {"description", "virtual gonioreflectometer: height fields to BRDF tables"},
