@@ -50,8 +50,8 @@ export async function request(path, options = {}) {
             if (sessionStorage.getItem(tokenKey) === token) await newToken(token);
             continue;
         }
-        const isProblem = response.headers.get("Content-Type")?.includes("json");
-        throw new Problem(response.status, isProblem ? await response.json() : { detail: response.statusText });
+        // The answer to HEAD has no body, and that of a proxy on the way is no JSON.
+        throw new Problem(response.status, await response.json().catch(() => ({ detail: response.statusText })));
     }
 }
 

@@ -51,5 +51,6 @@ export async function showComparison(box, ids) {
     const incidence = makeIncidence(pairs.map(([i]) => first.incident[i]), show);
     draw();
     box.replaceChildren(head, element("div", { class: "card toolbar", role: "group", "aria-label": "What is shown" }, incidence.box, first.channels.length > 1 ? channel.box : null, scaling.box, band.box),
-        element("div", { class: "grid" }, card("Lobes over each other", lobes), card("How far apart", numbers)));
+        element("div", { class: "halves" }, element("div", { class: "stack" }, card("Lobes over each other", lobes)),
+            element("div", { class: "stack" }, card("How far apart", numbers))));
 }

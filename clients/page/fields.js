@@ -77,7 +77,7 @@ export function makeChoice(label, groups, pointer, chosen) {
     select.addEventListener("change", show);
     show();
     return {
-        box: element("div", { class: "choice" },
+        box: element("div", { class: "alternatives" },
             element("div", { class: "field", "data-pointer": pointer },
                 element("label", { for: id }, label), element("div", { class: "controls" }, select), error), shown),
         read: () => ({ ...groups[select.value].constant, ...made[select.value].read() }),

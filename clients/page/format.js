@@ -10,7 +10,7 @@ export function withError(value, sigma) {
 
 /** Four significant digits, without trailing zeros. */
 export function plain(value) {
-    if (!Number.isFinite(value)) return "–";
+    if (!Number.isFinite(value)) return "∞";
     return String(Number(value.toPrecision(4)));
 }
 

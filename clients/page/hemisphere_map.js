@@ -16,12 +16,18 @@ export class HemisphereMap {
     constructor() {
         this.canvas = element("canvas", { width: size, height: size, role: "img", tabindex: 0 });
         this.marks = svg("svg", { viewBox: "-1.16 -1.16 2.32 2.32", class: "marks", "aria-hidden": "true" });
-        this.readout = element("p", { class: "readout", role: "status" }, "Point at the map to read a value.");
+        this.readout = element("p", { class: "readout", role: "status" }, "Point at the map, or use the arrow keys on it, to read a value.");
         this.bar = element("canvas", { width: 256, height: 1, class: "bar", "aria-hidden": "true" });
         this.ends = element("div", { class: "ends" });
         this.box = element("div", { class: "hemisphere" }, element("div", { class: "disk" }, this.canvas, this.marks),
             element("div", { class: "colours" }, this.bar, this.ends), this.readout);
         this.canvas.addEventListener("pointermove", (event) => this.#read(event.offsetX / this.canvas.clientWidth, event.offsetY / this.canvas.clientHeight));
+        this.canvas.addEventListener("keydown", (event) => {
+            const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+            if (!step) return;
+            event.preventDefault();
+            this.#say(((this.cursor ?? -step) + step + this.samples.length) % this.samples.length);
+        });
         const context = this.bar.getContext("2d"), strip = context.createImageData(256, 1);
         for (let x = 0; x < 256; x++) strip.data.set([...viridis(x / 255), 255], 4 * x);
         context.putImageData(strip, 0, 0);
@@ -69,13 +75,21 @@ export class HemisphereMap {
             const turn = (phi * Math.PI) / 180;
             return svg("text", { x: 1.085 * Math.cos(turn), y: 0.025 - 1.085 * Math.sin(turn), "text-anchor": "middle" }, `${phi}°`);
         });
-        this.marks.replaceChildren(svg("circle", { class: "rim", r: 1 }), ...dots, ...azimuths,
+        this.cursor = undefined;
+        this.marks.replaceChildren(svg("circle", { class: "rim", r: 1 }), ...dots, ...azimuths, svg("circle", { class: "cursor", r: 0.03, transform: "translate(9 9)" }),
             svg("circle", { class: "sun-halo", cx: x, cy: -y, r: 0.045 }), svg("circle", { class: "sun", cx: x, cy: -y, r: 0.045 }));
     }
 
     #read(u, v) {
         const column = Math.floor(u * size), row = Math.floor(v * size);
-        const sample = this.samples?.[this.#pixels[row * size + column]];
-        if (sample) this.readout.textContent = `${direction([sample.theta, sample.phi])}: ${withError(sample.f, sample.sigma)} 1/sr`;
+        const sample = this.#pixels[row * size + column];
+        if (sample >= 0) this.#say(sample);
+    }
+
+    #say(index) {
+        const sample = this.samples[index], [x, y] = toVector([sample.theta, sample.phi]);
+        this.cursor = index;
+        this.readout.textContent = `${direction([sample.theta, sample.phi])}: ${withError(sample.f, sample.sigma)} 1/sr`;
+        this.marks.querySelector(".cursor").setAttribute("transform", `translate(${x} ${-y})`);
     }
 }

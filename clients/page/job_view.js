@@ -21,7 +21,7 @@ async function showResult(box, info) {
     const views = table.tooLarge
         ? element("p", { class: "card quiet" }, `The table has ${table.tooLarge}: too much to draw here. Download it below.`)
         : makeResultView(table, report);
-    box.replaceChildren(element("p", { class: "quiet" }, describe(document)), views, element("div", { class: "grid" }, card("Files", downloads(results),
+    box.replaceChildren(element("p", { class: "quiet" }, describe(document)), views, element("div", { class: "stack" }, card("Files", downloads(results),
         element("p", { class: "hint" }, `Job hash ${info.job_hash}`)), card("The same from a terminal", snippets(info, document, tableFormats(results)))));
 }
 

@@ -35,6 +35,7 @@ function showConnection(seconds) {
     if (seconds === null) {
         banner.className = "back";
         find("connection-text").textContent = "The server is back.";
+        find("connection-time").textContent = "";
         find("try-now").hidden = true;
         countdown = setTimeout(() => (banner.hidden = true), 4000);
         return;

@@ -91,6 +91,8 @@ export function makeResultView(table, report) {
     draw();
     const warnings = [...(numbers.warnings ?? []), ...(report.surface?.warnings ?? [])];
     return element("div", { class: "result" }, controls,
-        element("div", { class: "grid" }, card("Lobes in the plane of incidence", lobes), card("Hemisphere", map.box),
-            card("Numbers", facts, warnings.map((text) => element("p", { class: "warning" }, text))), card("Orders of scattering", split), card("Sphere", makeSphereView(table))));
+        element("div", { class: "halves" },
+            element("div", { class: "stack" }, card("Lobes in the plane of incidence", lobes), card("Orders of scattering", split),
+                card("Numbers", facts, warnings.map((text) => element("p", { class: "warning" }, text)))),
+            element("div", { class: "stack" }, card("Hemisphere", map.box), card("Sphere", makeSphereView(table)))));
 }

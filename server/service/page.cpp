@@ -35,7 +35,6 @@ Response page_file(const Request& request, const std::string& name) {
     // Asked for again each time, so that a new program shows a new page.
     response.set("Cache-Control", "no-cache");
     response.set("Content-Security-Policy", content_security_policy);
-    response.set("X-Content-Type-Options", "nosniff");
     response.set("Referrer-Policy", "no-referrer");
     if (http::matches_etag(request.header_list("If-None-Match"), etag)) {
         response.status = 304;
