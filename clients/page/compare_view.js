@@ -44,13 +44,14 @@ export async function showComparison(box, ids) {
         const ranges = [first.range(c), second.range(other)];
         const scale = makeScale({ low: Math.min(...ranges.map((r) => r.low)), high: Math.max(...ranges.map((r) => r.high)) }, scaling.select.value === "log");
         const lines = [first.samples(i, c), second.samples(j, other)].map((samples, k) => ({ label: names[k], ...inPlane(samples, wi) }));
-        lobes.replaceChildren(lobePlot(lines, { theta_i: wi[0], scale, bandSigmas: Number(band.select.value) }), legend(lines), lobeTable(lines));
+        lobes.replaceChildren(lobePlot(lines, { theta_i: wi[0], scale, bandSigmas: Number(band.select.value) }), legend(lines), lobeTable(lines, lobes));
         if (numbers.dataset.channel !== String(c)) numbers.replaceChildren(numbersOf(first, second, c));
         numbers.dataset.channel = c;
     };
     const incidence = makeIncidence(pairs.map(([i]) => first.incident[i]), show);
     draw();
-    box.replaceChildren(head, element("div", { class: "card toolbar", role: "group", "aria-label": "What is shown" }, incidence.box, first.channels.length > 1 ? channel.box : null, scaling.box, band.box),
+    box.replaceChildren(head, element("div", { class: "card toolbar", role: "group", "aria-label": "What is shown" }, incidence.box,
+        element("div", { class: "choosers" }, first.channels.length > 1 ? channel.box : null, scaling.box, band.box)),
         element("div", { class: "halves" }, element("div", { class: "stack" }, card("Lobes over each other", lobes)),
             element("div", { class: "stack" }, card("How far apart", numbers))));
 }

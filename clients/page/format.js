@@ -4,7 +4,7 @@
 export function withError(value, sigma) {
     if (!(sigma > 0)) return `${plain(value)} ± 0`;
     const decimals = Math.max(0, 1 - Math.floor(Math.log10(sigma)));
-    if (decimals > 9 || Math.abs(value) >= 1e6) return `${value.toExponential(3)} ± ${sigma.toExponential(1)}`;
+    if (decimals > 7 || Math.abs(value) >= 1e6) return `${plain(value)} ± ${sigma.toExponential(1)}`;
     return `${value.toFixed(decimals)} ± ${sigma.toFixed(decimals)}`;
 }
 

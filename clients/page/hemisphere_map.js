@@ -59,7 +59,7 @@ export class HemisphereMap {
         for (let row = 0; row < size; row++) {
             for (let column = 0; column < size; column++) {
                 const x = (2 * column + 1) / size - 1, y = 1 - (2 * row + 1) / size, z2 = 1 - x * x - y * y;
-                if (z2 > 0) this.#pixels[row * size + column] = near.find([x, y, Math.sqrt(z2)])[0].index;
+                if (z2 > 0) this.#pixels[row * size + column] = near.find([x, y, Math.sqrt(z2)]).indices[0];
             }
         }
     }

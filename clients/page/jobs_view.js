@@ -11,7 +11,8 @@ export function statusPill(info) {
 
 /** Bar and words for a job that has not ended. */
 export function progressOf(info) {
-    const parts = [`${info.progress} %`, info.message, info.relative_error ? `${percent(info.relative_error)} error so far` : null,
+    const stage = info.message || (info.status === "accepted" ? "waiting for its turn" : "starting");
+    const parts = [`${info.progress} %`, stage, info.relative_error ? `${percent(info.relative_error)} error so far` : null,
         info.seconds_left !== undefined ? `about ${duration(info.seconds_left)} left` : null];
     return element("div", { class: "progress" },
         element("progress", { max: 100, value: info.progress, "aria-label": "Progress" }), element("span", {}, parts.filter(Boolean).join(" · ")));

@@ -4,55 +4,53 @@ import { toVector } from "./table.js";
 /** Finds among `directions` ([theta, phi] in degrees). A search over all would be too slow for one per pixel, so
  *  they are sorted into cells of the projected disk, and cells are searched in growing squares. */
 export class NearestDirections {
-    #cells = new Map();
-
     constructor(directions) {
         this.vectors = directions.map(toVector);
         this.side = Math.max(1, Math.round(Math.sqrt(directions.length) / 2));
-        this.vectors.forEach((v, k) => {
-            const key = this.#key(...this.#cell(v));
-            this.#cells.set(key, [...(this.#cells.get(key) ?? []), k]);
-        });
+        this.cells = Array.from({ length: this.side ** 2 }, () => []);
+        this.vectors.forEach(([x, y], k) => this.cells[this.#cell(y) * this.side + this.#cell(x)].push(k));
     }
 
-    #cell([x, y]) {
-        return [x, y].map((c) => Math.min(this.side - 1, Math.floor(((c + 1) / 2) * this.side)));
-    }
-    #key(column, row) {
-        return row * this.side + column;
+    #cell(coordinate) {
+        return Math.min(this.side - 1, Math.floor(((coordinate + 1) / 2) * this.side));
     }
 
-    /** Indices of the `count` nearest to the unit vector [x, y, z], nearest first, with squared chords:
-     *  [{index, chord2}]. */
+    /** Indices of the `count` nearest to the unit vector, nearest first, and their squared chords. */
     find(vector, count = 1) {
-        const [column, row] = this.#cell(vector);
-        const found = [];
+        const column = this.#cell(vector[0]), row = this.#cell(vector[1]);
+        const best = { indices: [], chords2: [] };
         const enough = Math.min(count, this.vectors.length);
         for (let reach = 0; reach <= this.side; reach++) {
-            for (let r = row - reach; r <= row + reach; r++) {
+            for (let r = Math.max(0, row - reach); r <= Math.min(this.side - 1, row + reach); r++) {
                 const step = Math.abs(r - row) === reach ? 1 : 2 * reach;
-                for (let c = column - reach; c <= column + reach; c += step) this.#collect(c, r, vector, found);
+                for (let c = column - reach; c <= column + reach; c += step) {
+                    if (c >= 0 && c < this.side) this.#collect(this.cells[r * this.side + c], vector, enough, best);
+                }
             }
-            found.sort((a, b) => a.chord2 - b.chord2);
             // Whatever was not looked at yet is at least `reach` cells away.
-            if (found.length >= enough && found[enough - 1].chord2 <= ((2 * reach) / this.side) ** 2) break;
+            if (best.indices.length === enough && best.chords2[enough - 1] <= ((2 * reach) / this.side) ** 2) break;
         }
-        return found.slice(0, enough);
+        return best;
     }
 
-    #collect(column, row, [x, y, z], found) {
-        if (column < 0 || row < 0 || column >= this.side || row >= this.side) return;
-        for (const index of this.#cells.get(this.#key(column, row)) ?? []) {
+    #collect(cell, [x, y, z], enough, { indices, chords2 }) {
+        for (const index of cell) {
             const v = this.vectors[index];
-            found.push({ index, chord2: (v[0] - x) ** 2 + (v[1] - y) ** 2 + (v[2] - z) ** 2 });
+            const chord2 = (v[0] - x) ** 2 + (v[1] - y) ** 2 + (v[2] - z) ** 2;
+            let place = indices.length;
+            while (place > 0 && chords2[place - 1] > chord2) place--;
+            if (place === enough) continue;
+            indices.splice(place, 0, index);
+            chords2.splice(place, 0, chord2);
+            indices.length = chords2.length = Math.min(indices.length, enough);
         }
     }
 
     /** The four nearest with weights that sum to 1: [{index, weight}]. */
     weights(vector) {
-        const near = this.find(vector, 4);
-        if (near[0].chord2 < 1e-12) return [{ index: near[0].index, weight: 1 }];
-        const total = near.reduce((sum, one) => sum + 1 / one.chord2, 0);
-        return near.map(({ index, chord2 }) => ({ index, weight: 1 / chord2 / total }));
+        const { indices, chords2 } = this.find(vector, 4);
+        if (chords2[0] < 1e-12) return [{ index: indices[0], weight: 1 }];
+        const total = chords2.reduce((sum, chord2) => sum + 1 / chord2, 0);
+        return indices.map((index, k) => ({ index, weight: 1 / chords2[k] / total }));
     }
 }

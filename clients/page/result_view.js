@@ -23,15 +23,16 @@ export function chooser(label, choices, onchange) {
 export const scaleChooser = (onchange) => chooser("Scale", [["linear", "linear"], ["log", "logarithmic"]], onchange);
 export const bandChooser = (onchange) => chooser("Error band", [["1", "± 1 σ"], ["10", "± 10 σ"], ["100", "± 100 σ"]], onchange);
 
-/** Values of lobes as text: for screen readers, and for whoever wants the numbers. */
-export function lobeTable(lines) {
+/** Values of lobes as text: for screen readers, and for whoever wants the numbers. Open if the one in `box`, which
+ *  it is to replace, was. */
+export function lobeTable(lines, box) {
     const head = element("tr", {}, element("th", { scope: "col" }, "θ"), lines.map((line) => element("th", { scope: "col" }, `${line.label}, 1/sr`)));
     const angles = [...new Set(lines.flatMap((line) => line.points.map((p) => p.theta)))].sort((a, b) => a - b);
     const cell = (line, theta) => {
         const p = line.points.find((one) => one.theta === theta);
         return element("td", {}, p ? withError(p.f, p.sigma) : "");
     };
-    return element("details", {}, element("summary", {}, "The values"), element("div", { class: "scroll", tabindex: 0 }, element("table", {}, element("thead", {}, head),
+    return element("details", { open: box.querySelector("details")?.open }, element("summary", {}, "The values"), element("div", { class: "scroll", tabindex: 0 }, element("table", {}, element("thead", {}, head),
         element("tbody", {}, angles.map((theta) => element("tr", {}, element("th", { scope: "row" }, `${plain(theta)}°`), lines.map((line) => cell(line, theta))))))));
 }
 
@@ -78,7 +79,7 @@ export function makeResultView(table, report) {
         const cut = inPlane(samples, wi);
         const lines = [{ label: `${orderName(k)}, channel ${table.channels[c]}`, ...cut }];
         lobes.replaceChildren(lobePlot(lines, { theta_i: wi[0], scale, bandSigmas: Number(band.select.value) }), legend(lines),
-            cut.exact ? "" : element("p", { class: "hint" }, `No outgoing direction lies in the plane of incidence: the dots are the ${cut.points.length} within 7° of it.`), lobeTable(lines));
+            cut.exact ? "" : element("p", { class: "hint" }, `No outgoing direction lies in the plane of incidence: the dots are the ${cut.points.length} within 7° of it.`), lobeTable(lines, lobes));
         map.show(samples, wi, scale);
         split.replaceChildren(ordersView(table, incident, c, cells));
         if (!reciprocityOf.has(c)) reciprocityOf.set(c, reciprocityFacts(table, c));
@@ -86,8 +87,8 @@ export function makeResultView(table, report) {
             fact("Relative error", percent(numbers.relative_error), numbers.target_met ? "The target is met." : "The target was not reached."));
     };
     const incidence = makeIncidence(table.incident, show);
-    const controls = element("div", { class: "card toolbar", role: "group", "aria-label": "What is shown" }, incidence.box, table.channels.length > 1 ? channel.box : null,
-        table.orders ? order.box : null, scaling.box, band.box);
+    const controls = element("div", { class: "card toolbar", role: "group", "aria-label": "What is shown" }, incidence.box,
+        element("div", { class: "choosers" }, table.channels.length > 1 ? channel.box : null, table.orders ? order.box : null, scaling.box, band.box));
     draw();
     const warnings = [...(numbers.warnings ?? []), ...(report.surface?.warnings ?? [])];
     return element("div", { class: "result" }, controls,

@@ -64,7 +64,7 @@ export async function brightness(page, locator) {
         await image.decode();
         const canvas = document.createElement("canvas");
         [canvas.width, canvas.height] = [image.width, image.height];
-        const context = canvas.getContext("2d");
+        const context = canvas.getContext("2d", { willReadFrequently: true });
         context.drawImage(image, 0, 0);
         const middle = Math.floor(image.width / 2);
         const mean = (from, width) => {

@@ -89,8 +89,8 @@ describe("submitting", () => {
             await page.locator("[data-pointer='/inputs/surface/width'] .error", { hasText: "does not carry this length" }).waitFor();
             const stored = await fetch(`${service.url}/surfaces/${hash}`);
             assert.equal(sha256(Buffer.from(await stored.arrayBuffer())), hash, "the map arrived whole");
-            await page.getByLabel("Width of the whole map").fill("50");
-            await page.getByLabel("Height range").fill("5");
+            await page.getByLabel("Width of the whole map", { exact: true }).fill("50");
+            await page.getByLabel("Height range", { exact: true }).fill("5");
             await page.getByRole("button", { name: "Preview the surface" }).click();
             const image = page.getByAltText("Hillshade of the surface");
             await image.waitFor();
