@@ -51,16 +51,16 @@ describe("a result", () => {
         await phi.fill("1");
         assert.equal(await phi.getAttribute("aria-valuetext"), "phi 90 degrees");
         assertShows(await shown(), lookUp(table, 0, 0, [60, 90], [40, 90]));
-        await page.getByLabel("Channel").selectOption("b");
+        await page.getByLabel("Channel", { exact: true }).selectOption("b");
         assertShows(await shown(), lookUp(table, 2, 0, [60, 90], [40, 90]));
         await page.getByLabel("Light", { exact: true }).selectOption("order 2");
         assertShows(await shown(), lookUp(table, 2, 2, [60, 90], [40, 90]));
         const linear = await lobe(page);
-        await page.getByLabel("Scale").selectOption("logarithmic");
+        await page.getByLabel("Scale", { exact: true }).selectOption("logarithmic");
         assert.notEqual(await lobe(page), linear);
         const band = () => page.locator(".plot .band").getAttribute("d");
         const narrow = await band();
-        await page.getByLabel("Error band").selectOption("± 100 σ");
+        await page.getByLabel("Error band", { exact: true }).selectOption("± 100 σ");
         assert.notEqual(await band(), narrow);
     }));
 
