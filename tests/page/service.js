@@ -10,6 +10,11 @@ import { createInterface } from "node:readline";
 
 const { GONIO } = process.env;
 
+// No server outlives the tests, however they end.
+const running = new Set();
+process.on("exit", () => running.forEach((child) => child.kill("SIGKILL")));
+process.once("SIGTERM", () => process.exit(1));
+
 export class Service {
     /** `tokens`: lines of a token file; none is wanted without. */
     static async start(tokens) {
@@ -29,6 +34,7 @@ export class Service {
     async launch(address) {
         this.process = spawn(GONIO, ["serve", "--data", join(this.folder, "data"), "--listen", address, "--threads", "1", ...this.options],
             { stdio: ["ignore", "pipe", "inherit"] });
+        running.add(this.process);
         const [line] = await once(createInterface(this.process.stdout), "line");
         this.url = /^listening on (http:\S+)$/.exec(line)[1];
     }
@@ -38,6 +44,7 @@ export class Service {
         const ended = once(this.process, "exit");
         this.process.kill("SIGKILL");
         await ended;
+        running.delete(this.process);
     }
 
     /** After kill(): the same data at the same address. */
