@@ -14,6 +14,7 @@
 #include "server/service/api.h"
 #include "server/service/engine.h"
 #include "server/service/metrics.h"
+#include "server/service/page.h"
 
 namespace gonio {
 namespace {
@@ -81,7 +82,8 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     Metrics metrics;
     http::ServerHooks hooks;
     hooks.gate = [&](const http::Request& request) -> std::string {
-        if (!tokens || request.target == "/healthz" || request.target == "/readyz") return "";
+        if (!tokens || request.target == "/healthz" || request.target == "/readyz" || is_page_request(request))
+            return "";
         return tokens->demand(request);
     };
     hooks.log = [&](const http::Request& request, int status, std::chrono::microseconds took) {
@@ -95,6 +97,7 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     server_limits.event_streams = serve.limits.event_streams;
     http::GuardedServer server(server_limits, hooks), admin;
     const Api api(store, server, serve.limits, times);
+    add_page(server);
     EngineOptions options;
     options.run = common.run_options();
     options.limits = serve.limits;

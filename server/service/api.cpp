@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "server/service/openapi.h"
+#include "server/service/page.h"
 #include "server/service/processes.h"
 #include "server/service/responses.h"
 
@@ -77,7 +78,9 @@ Api::Api(Store& store, http::GuardedServer& server, const ServiceLimits& limits,
 }
 
 void Api::add_documents() {
-    server_.route("GET", "/", [](Request&) { return json_response(200, landing()); });
+    server_.route("GET", "/", [](Request& request) {
+        return is_page_request(request) ? to_page() : json_response(200, landing());
+    });
     server_.route("GET", "/api", [](Request&) {
         Response response;
         response.set("Content-Type", openapi_media_type);

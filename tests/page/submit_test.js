@@ -1,0 +1,155 @@
+// From an idea to an accepted job: the form, height maps, the preview, errors at their fields.
+import assert from "node:assert/strict";
+import { readFile } from "node:fs/promises";
+import { after, before, describe, it } from "node:test";
+import { screenshot, withPage } from "./browser.js";
+import { Service, sha256 } from "./service.js";
+
+const mapPath = new URL(`${process.env.SAMPLES}/lava_rock_256_16bit.png`, "file://");
+
+// A height map dropped anywhere on the form.
+async function drop(page, name, bytes) {
+    const transfer = await page.evaluateHandle(([fileName, content]) => {
+        const list = new DataTransfer();
+        list.items.add(new File([Uint8Array.from(atob(content), (c) => c.charCodeAt(0))], fileName));
+        return list;
+    }, [name, bytes.toString("base64")]);
+    await page.dispatchEvent("form[aria-label='New measurement']", "drop", { dataTransfer: transfer });
+}
+
+const measure = (page) => page.getByRole("button", { name: "Measure", exact: true });
+const sentInputs = (page) => page.waitForRequest((request) => request.url().endsWith("/processes/brdf/execution")).then((request) => request.postDataJSON().inputs);
+
+describe("submitting", () => {
+    let service;
+    before(async () => (service = await Service.start()));
+    after(() => service.stop());
+
+    it("measures what the form says", () => withPage(`${service.url}/`, async (page) => {
+        assert.equal(new URL(page.url()).pathname, "/page/", "a browser is sent from / to the page");
+        await screenshot(page, "new");
+        await page.getByLabel("Relief").selectOption("v_groove");
+        await page.getByLabel("Points along x").fill("32");
+        await page.getByLabel("Period", { exact: true }).fill("0.5");
+        await page.getByLabel("Unit of Period").selectOption("mm");
+        await page.getByLabel("Seen from").selectOption("hemisphere");
+        await page.getByLabel("In the table").selectOption("separate");
+        await page.getByLabel("Orders of scattering").fill("2");
+        const sent = sentInputs(page);
+        await measure(page).click();
+        assert.deepEqual(await sent, {
+            surface: { generate: "v_groove", samples: 32, period: "0.5 mm", slope_deg: 45 },
+            material: { model: "lambertian", albedo: 0.8 },
+            measure: { kind: "brdf", incident: { theta_deg: [0, 15, 30, 45, 60, 75], phi_deg: [0] }, outgoing: { hemisphere: 64 }, max_order: 2, orders: "separate" },
+            accuracy: { target_relative_error: 0.01, seed: 1 },
+        });
+        await page.getByRole("region", { name: "Lobes in the plane of incidence" }).waitFor();
+        await page.getByText("No outgoing direction lies in the plane of incidence").waitFor();
+    }));
+
+    it("shows an error of the server at its field, and only there", () => withPage(`${service.url}/page/`, async (page) => {
+        const albedo = page.getByLabel("Albedo", { exact: true }), theta = page.getByLabel("θ from the normal, degrees").first();
+        await albedo.fill("1.5");
+        await measure(page).click();
+        await page.getByText("must be a number from 0 to 1").waitFor();
+        assert.equal(await page.locator("[aria-invalid]").count(), 1);
+        assert.equal(await albedo.getAttribute("aria-invalid"), "true");
+        assert.ok(await albedo.evaluate((field) => field === document.activeElement), "the focus is on it");
+        assert.match(await albedo.evaluate((field) => document.getElementById(field.getAttribute("aria-describedby").split(" ")[0]).textContent), /^1\.5: must be/);
+        await screenshot(page, "field_error");
+        await albedo.fill("0.5");
+        await theta.fill("0, 95");
+        await measure(page).click();
+        await page.locator("[data-pointer='/inputs/measure/incident/theta_deg'] [aria-invalid]").waitFor();
+        assert.equal(await page.locator("[aria-invalid]").count(), 1);
+        await theta.fill("0, x");
+        await measure(page).click();
+        await page.getByText("\"x\"").waitFor();
+        assert.equal((await service.json("/jobs?limit=100")).jobs.filter((job) => job.status !== "successful").length, 0, "nothing was accepted");
+    }, { allowed: [/status of 400/] }));
+
+    it("takes a dropped height map without crypto.subtle, asks for its units, previews and measures it", async () => {
+        const map = await readFile(mapPath);
+        const hash = sha256(map);
+        const statistics = { rows: 256, columns: 256, width_m: 0.05, depth_m: 0.05, Sq_m: 1e-3, steepest_slope_deg: 71, warnings: ["its edges do not meet"] };
+        // Stands in for the server's process "statistics".
+        const prepare = async (page) => {
+            await page.addInitScript(() => Object.defineProperty(crypto, "subtle", { value: undefined }));
+            await page.route("**/processes/statistics/execution", async (route) => {
+                const { surface } = route.request().postDataJSON().inputs;
+                if (surface.width) return route.fulfill({ status: 201, json: { jobID: "preview", status: "successful" } });
+                const detail = "the file (png) does not carry this length: state it";
+                return route.fulfill({ status: 400, json: { detail, errors: [{ pointer: "/inputs/surface/width", detail }] } });
+            });
+            await page.route("**/jobs/preview/results/report", (route) => route.fulfill({ json: statistics }));
+            await page.route("**/jobs/preview/results/hillshade", (route) => route.fulfill({ contentType: "image/png", body: map }));
+        };
+        await withPage(`${service.url}/page/`, async (page) => {
+            await drop(page, "lava.png", map);
+            await page.locator("[data-pointer='/inputs/surface/width'] .error", { hasText: "does not carry this length" }).waitFor();
+            const stored = await fetch(`${service.url}/surfaces/${hash}`);
+            assert.equal(sha256(Buffer.from(await stored.arrayBuffer())), hash, "the map arrived whole");
+            await page.getByLabel("Width of the whole map", { exact: true }).fill("50");
+            await page.getByLabel("Height range", { exact: true }).fill("5");
+            await page.getByRole("button", { name: "Preview the surface" }).click();
+            const image = page.getByAltText("Hillshade of the surface");
+            await image.waitFor();
+            assert.equal(await image.evaluate((shown) => shown.decode().then(() => shown.naturalWidth)), 256);
+            await page.getByText("256 × 256").waitFor();
+            await page.getByText("50 mm × 50 mm").waitFor();
+            await page.getByText("its edges do not meet").waitFor();
+            await screenshot(page, "preview");
+            await page.getByLabel("Target relative error").fill("0.2");
+            const sent = sentInputs(page);
+            await measure(page).click();
+            assert.deepEqual((await sent).surface, { sha256: hash, width: "50 mm", height_range: "5 mm", boundary: "periodic", level: "none" });
+            await page.waitForURL(/#job=/);
+        }, { prepare, allowed: [/status of 40[04]/] });
+    });
+
+    it("takes a chosen height map with crypto.subtle", () => withPage(`${service.url}/page/`, async (page) => {
+        await page.getByText("Height map", { exact: true }).click();
+        await page.setInputFiles("#height-map", { name: "one.bin", mimeType: "application/octet-stream", buffer: Buffer.from("not a picture") });
+        await page.getByText("one.bin, 13 B").waitFor();
+        assert.equal((await fetch(`${service.url}/surfaces/${sha256("not a picture")}`)).status, 200);
+        await page.getByText("This server makes no previews.").waitFor();
+    }, { allowed: [/status of 404/] }));
+
+    it("hashes like everybody else", () => withPage(`${service.url}/page/`, async (page) => {
+        for (const size of [0, 1, 55, 56, 63, 64, 65, 119, 120, 1000, 70001]) {
+            const own = await page.evaluate(async (n) => {
+                const { sha256InScript } = await import("/page/sha256.js");
+                return sha256InScript(Uint8Array.from({ length: n }, (_, k) => (k * 7 + n) % 256));
+            }, size);
+            assert.equal(own, sha256(Uint8Array.from({ length: size }, (_, k) => (k * 7 + size) % 256)), `${size} bytes`);
+        }
+    }));
+
+    it("can be done with the keyboard alone", () => withPage(`${service.url}/page/`, async (page) => {
+        // Tab until the focus is where the test wants it: nothing else moves it.
+        const tabTo = async (label) => {
+            for (let presses = 0; presses < 60; presses++) {
+                const name = await page.evaluate(() => document.activeElement.labels?.[0]?.textContent ?? document.activeElement.textContent);
+                if (name === label) return;
+                await page.keyboard.press("Tab");
+            }
+            assert.fail(`no way to ${label}`);
+        };
+        await tabTo("Generated");
+        await page.keyboard.press("ArrowRight");
+        await page.getByText("Choose a height map").waitFor();
+        await page.keyboard.press("ArrowLeft");
+        await tabTo("Relief");
+        await page.keyboard.type("V-g");
+        await tabTo("Points along x");
+        await page.keyboard.press("Control+A");
+        await page.keyboard.type("16");
+        await tabTo("Measure");
+        await page.keyboard.press("Enter");
+        await page.getByRole("region", { name: "Sphere", exact: true }).waitFor();
+        await tabTo("Light θ");
+        const before = await page.locator(".plot .lobe").getAttribute("d");
+        await page.keyboard.press("ArrowRight");
+        assert.notEqual(await page.locator(".plot .lobe").getAttribute("d"), before);
+    }));
+});
