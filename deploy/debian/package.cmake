@@ -2,7 +2,7 @@
 find_program(gzip gzip REQUIRED)
 string(TIMESTAMP changelog_date "%a, %d %b %Y %H:%M:%S +0000" UTC)
 set(CPACK_DEBIAN_PACKAGE_RELEASE 1)
-set(CPACK_PACKAGE_CONTACT "gonio developers <gonio@localhost.localdomain>")
+set(CPACK_PACKAGE_CONTACT "gonio developers <gonio@example.org>")
 configure_file(debian/changelog.in changelog.Debian @ONLY)
 configure_file(${PROJECT_SOURCE_DIR}/CHANGELOG.md changelog COPYONLY)
 foreach(changelog changelog changelog.Debian)

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 """Asks a running service for its health, runs a small job on it and prints the job's id.
 
 Usage: job_check.py http://HOST:PORT [--token TOKEN] [--again JOB_ID] [--wait SECONDS]
