@@ -34,6 +34,7 @@ token=0123456789abcdef0123
 echo "test $token" > "$work/tokens"
 chown 10001 "$work/tokens"
 chmod 400 "$work/tokens"
+install -d -m 700 -o 10001 -g 10001 "$work/data"  # the volume, which outlives a container
 
 # A loopback interface of its own, so that port 8080 is free.
 export -f buildah ok fail
@@ -41,7 +42,7 @@ export container image token work here
 unshare --net bash -euc '
     ip link set lo up
     health=("${@:2:$1}") && shift $(($1 + 1))
-    in_image() { buildah run --volume "$work/tokens:/run/secrets/tokens:ro" "$container" -- "$@"; }
+    in_image() { buildah run --volume "$work/tokens:/run/secrets/tokens:ro" --volume "$work/data:/var/lib/gonio" "$container" -- "$@"; }
     if in_image "${health[@]}" 2> /dev/null; then fail "healthy before it runs"; fi
     in_image "$@" > "$work/out" 2>&1 &
     "$here/job_check.py" http://127.0.0.1:8080 --token "$token" --wait 120 > "$work/job" || fail "$(cat "$work/out")"
@@ -52,6 +53,7 @@ unshare --net bash -euc '
     ok "runs a job as user $user, healthy, ends on SIGTERM"
     # As PID 1, which a container gives it, a signal without a handler would be ignored.
     mkdir -p "$image/run/secrets" && cp -p "$work/tokens" "$image/run/secrets/"
+    mount --bind "$work/data" "$image/var/lib/gonio"
     unshare --pid --fork --mount-proc chroot --userspec=10001:10001 "$image" "$@" > "$work/out" &
     "$here/job_check.py" http://127.0.0.1:8080 --token "$token" --again "$(cat "$work/job")" > /dev/null
     kill -TERM $(pgrep -x gonio) && wait $!

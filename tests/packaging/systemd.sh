@@ -73,7 +73,7 @@ except urllib.error.HTTPError as error: print(error.code)')
 inside journalctl -u gonio --no-pager | grep -q 'listening on http' || fail "the journal does not say where it listens"
 ok "runs a job behind every wall of the unit, as user $user"
 
-inside kill -KILL "$main"
+inside systemctl kill --kill-whom=main --signal=KILL gonio.service
 check_job --again "$job" > /dev/null
 [ "$(service_property NRestarts)" = 1 ] || fail "NRestarts is $(service_property NRestarts)"
 ok "comes back after kill -9, with its jobs"
