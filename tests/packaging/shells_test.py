@@ -56,7 +56,7 @@ class Completion:
 
     def test_completes_the_value_of_an_option(self):
         (self.folder / "relief.gsf").touch()
-        self.assertEqual(self.completed("gonio run --checkpoints rel"), "gonio run --checkpoints relief.gsf")
+        self.assertEqual(self.completed("gonio serve --data rel"), "gonio serve --data relief.gsf")
 
     def test_leaves_alone_what_it_does_not_know(self):
         self.assertEqual(self.completed("gonio run --nothing-like"), "gonio run --nothing-like")
