@@ -28,5 +28,7 @@ void add_store(CLI::App& app, CommonOptions& common, Action& action);
 void add_plot(CLI::App& app, CommonOptions& common, Action& action);
 void add_ndf(CLI::App& app, CommonOptions& common, Action& action);
 void add_schema(CLI::App& app, Action& action);
+void add_completions(CLI::App& app, Action& action);
+void add_man_pages(CLI::App& app, Action& action);
 
 }  // namespace gonio

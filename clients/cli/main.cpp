@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 
+#include "clients/cli/command_tree.h"
 #include "clients/cli/commands.h"
 #include "clients/cli/console.h"
 #include "clients/cli/execute.h"
@@ -25,7 +26,7 @@ class ExamplesFirst : public CLI::Formatter {
 int usage_error(const CLI::App& app, const std::string& first_argument, const std::string& message) {
     std::string names, help = "gonio --help";
     bool is_unknown = !first_argument.empty() && first_argument[0] != '-';
-    for (const CLI::App* command : app.get_subcommands({})) {
+    for (const CLI::App* command : gonio::visible_commands(app)) {
         names += (names.empty() ? "" : ", ") + command->get_name();
         if (command->get_name() != first_argument) continue;
         is_unknown = false;
@@ -78,6 +79,8 @@ int main(int argc, char** argv) {
     gonio::add_plot(app, common, action);
     gonio::add_ndf(app, common, action);
     gonio::add_schema(app, action);
+    gonio::add_completions(app, action);
+    gonio::add_man_pages(app, action);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {

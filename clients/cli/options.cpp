@@ -21,7 +21,7 @@ void add_run_options(CLI::App& command, CommonOptions& common) {
     common.threads = std::max(1u, std::thread::hardware_concurrency());
     command.add_option("--threads", common.threads, "Threads; the result has the same bits for any number")
         ->check(CLI::Range(1, 1024))
-        ->capture_default_str();
+        ->default_str("all");  // not this machine's number: manual pages are for any machine
     command
         .add_option("--max-memory", common.max_memory_gib,
                     "Working memory in GiB; a job that cannot keep it is refused")
