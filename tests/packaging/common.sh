@@ -21,7 +21,7 @@ apt_in() { # ROOT ARGUMENT...
 later_package() { # PACKAGE RESULT
     dpkg-deb -R "$1" "$work/later"
     sed -i 's/^Version: .*/&+later/' "$work/later/DEBIAN/control"
-    dpkg-deb --root-owner-group -b "$work/later" "$2" > /dev/null
+    dpkg-deb -Znone --root-owner-group -b "$work/later" "$2" > /dev/null
     rm -rf "$work/later"
 }
 
