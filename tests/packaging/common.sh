@@ -25,9 +25,9 @@ later_package() { # PACKAGE RESULT
     rm -rf "$work/later"
 }
 
-# Files whose name says whose they were.
+# Files whose name says whose they were, but for the pages that man keeps of what it has shown.
 left_over() { # ROOT
-    find "$1" -xdev -name '*gonio*' -not -path "$1/proc/*"
+    find "$1" -xdev -name '*gonio*' -not -path "$1/proc/*" -not -path "$1/var/cache/man/*"
 }
 
 # Waits for "listening on http://HOST:PORT" in a file and prints the port.
