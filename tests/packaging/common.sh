@@ -21,13 +21,13 @@ apt_in() { # ROOT ARGUMENT...
 later_package() { # PACKAGE RESULT
     dpkg-deb -R "$1" "$work/later"
     sed -i 's/^Version: .*/&+later/' "$work/later/DEBIAN/control"
-    dpkg-deb --root-owner-group -b "$work/later" "$2" > /dev/null
+    dpkg-deb -Znone --root-owner-group -b "$work/later" "$2" > /dev/null
     rm -rf "$work/later"
 }
 
-# Files whose name says whose they were.
+# Files whose name says whose they were, but for the pages that man keeps of what it has shown.
 left_over() { # ROOT
-    find "$1" -xdev -name '*gonio*' -not -path "$1/proc/*"
+    find "$1" -xdev -name '*gonio*' -not -path "$1/proc/*" -not -path "$1/var/cache/man/*"
 }
 
 # Waits for "listening on http://HOST:PORT" in a file and prints the port.

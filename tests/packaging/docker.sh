@@ -16,6 +16,7 @@ buildah bud --format docker --build-arg BASE=localhost/debian -f deploy/docker/D
 ok "built; $(du -sm "$(buildah mount "$(buildah from gonio)")" | cut -f1) MiB"
 
 container=$(buildah from gonio)
+buildah config --volume /var/lib/gonio- "$container"  # buildah would throw away what is written there
 image=$(buildah mount "$container")
 [ ! -e "$image/etc/gonio/tokens" ] || fail "the image carries a token"
 [ -z "$(find "$image/usr/bin" -name 'g++*' -o -name cmake)" ] || fail "the image carries the compiler"

@@ -36,7 +36,8 @@ def job(surface_section: dict, target: float = 0.01) -> dict:
 
 
 # Minutes of work: only a dismissal ends it.
-LONG_JOB = job({"generate": "gaussian", "samples": 512, "pitch": "1 um", "correlation_length": "4 um", "rms_slope": 1}, 1e-6)
+LONG_JOB = job({"generate": "gaussian", "samples": 512, "pitch": "1 um", "correlation_length": "4 um",
+                "rms_slope": 1}, 1e-6)
 
 
 class Connection(http.client.HTTPSConnection):
@@ -83,21 +84,24 @@ class BehindNginx(unittest.TestCase):
     @classmethod
     def start_nginx(cls) -> None:
         folder = cls.folder
-        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-days", "1",
-                        "-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME}",
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes",
+                        "-days", "1", "-subj", f"/CN={NAME}", "-addext", f"subjectAltName=DNS:{NAME}",
                         "-keyout", folder / "key.pem", "-out", folder / "cert.pem"], check=True, capture_output=True)
         cls.tls, cls.plain = folder / "tls.socket", folder / "plain.socket"
         site = (SOURCE / "deploy/nginx/gonio.conf").read_text()
-        for ours, theirs in {"server 127.0.0.1:8080;": f"server 127.0.0.1:{cls.port};", "listen 80;": f"listen unix:{cls.plain};",
+        for ours, theirs in {"server 127.0.0.1:8080;": f"server 127.0.0.1:{cls.port};",
+                             "listen 80;": f"listen unix:{cls.plain};",
                              "listen 443 ssl http2;": f"listen unix:{cls.tls} ssl http2;",
                              "/etc/ssl/certs/gonio.pem": str(folder / "cert.pem"),
                              "/etc/ssl/private/gonio.key": str(folder / "key.pem")}.items():
             assert site.count(ours) == 1, ours
             site = site.replace(ours, theirs)
         (folder / "site.conf").write_text(site)
-        places = "".join(f"{kind}_temp_path {folder / kind};" for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
-        (folder / "nginx.conf").write_text(f"daemon off; pid {folder / 'pid'}; error_log {folder / 'error.log'};\n"
-                                           f"events {{}}\nhttp {{ access_log off; {places} include {folder / 'site.conf'}; }}\n")
+        places = "".join(f"{kind}_temp_path {folder / kind};"
+                         for kind in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
+        (folder / "nginx.conf").write_text(
+            f"daemon off; pid {folder / 'pid'}; error_log {folder / 'error.log'};\n"
+            f"events {{}}\nhttp {{ access_log off; {places} include {folder / 'site.conf'}; }}\n")
         nginx = cls.start("/usr/sbin/nginx", "-p", folder, "-c", folder / "nginx.conf", "-e", folder / "error.log")
         while not cls.tls.exists():
             assert nginx.poll() is None, (folder / "error.log").read_text()
@@ -142,7 +146,8 @@ class BehindNginx(unittest.TestCase):
         connection.request("GET", f"/jobs/{job_id}/events", headers={"Authorization": f"Bearer {TOKEN}"})
         response = connection.getresponse()
         self.assertEqual(response.status, 200)
-        while not (line := response.readline()).startswith(b"event:"):  # a buffering proxy gives none: the socket times out
+        # A buffering proxy gives no line: the socket times out.
+        while not (line := response.readline()).startswith(b"event:"):
             self.assertTrue(line)
         status, body = self.call("GET", f"/jobs/{job_id}")
         self.assertIn(json.loads(body)["status"], ("accepted", "running"))
@@ -191,16 +196,18 @@ class BehindNginx(unittest.TestCase):
             self.assertIn("max-age=", self.headers["Strict-Transport-Security"] or "")
 
     def curl(self, *arguments: str) -> str:
-        return subprocess.run(["curl", "--silent", "--show-error", "--cacert", self.folder / "cert.pem", *arguments], check=True,
-                              capture_output=True, text=True, timeout=60).stdout
+        return subprocess.run(["curl", "--silent", "--show-error", "--cacert", self.folder / "cert.pem", *arguments],
+                              check=True, capture_output=True, text=True, timeout=60).stdout
 
     def test_http_2(self):
-        self.assertEqual(self.curl("--unix-socket", str(self.tls), "--http2", "-w", "%{http_version} %{http_code}", "-o", "/dev/null",
-                                   f"https://{NAME}/healthz"), "2 200")
+        answer = self.curl("--unix-socket", str(self.tls), "--http2", "-w", "%{http_version} %{http_code}",
+                           "-o", "/dev/null", f"https://{NAME}/healthz")
+        self.assertEqual(answer, "2 200")
 
     def test_plain_http_is_sent_to_tls(self):
-        self.assertEqual(self.curl("--unix-socket", str(self.plain), "-w", "%{http_code} %{redirect_url}", "-o", "/dev/null",
-                                   f"http://{NAME}/jobs?limit=1"), f"308 https://{NAME}/jobs?limit=1")
+        answer = self.curl("--unix-socket", str(self.plain), "-w", "%{http_code} %{redirect_url}",
+                           "-o", "/dev/null", f"http://{NAME}/jobs?limit=1")
+        self.assertEqual(answer, f"308 https://{NAME}/jobs?limit=1")
 
 
 if __name__ == "__main__":
