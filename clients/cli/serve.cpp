@@ -3,8 +3,8 @@
 
 #include <CLI/CLI.hpp>
 #include <charconv>
-#include <filesystem>
 #include <csignal>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <thread>
@@ -82,7 +82,8 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     Metrics metrics;
     http::ServerHooks hooks;
     hooks.gate = [&](const http::Request& request) -> std::string {
-        if (!tokens || request.target == "/healthz" || request.target == "/readyz" || is_page_request(request))
+        if (!tokens || request.target == "/healthz" || request.target == "/readyz" ||
+            is_page_request(request))
             return "";
         return tokens->demand(request);
     };
@@ -104,7 +105,8 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     if (!serve.executor.empty()) {
         options.executor = make_executor(serve.executor, serve.shards);
         options.shared_folder = serve.shared_folder.empty() ? serve.data + "/shards" : serve.shared_folder;
-        options.shard_command = {std::filesystem::read_symlink("/proc/self/exe").string(), serve.shards.threads};
+        options.shard_command = {std::filesystem::read_symlink("/proc/self/exe").string(),
+                                 serve.shards.threads};
     }
     options.on_end = [&](const std::string& process, const std::string& status, double seconds) {
         metrics.count_job(process, status, seconds);
@@ -142,11 +144,15 @@ void add_serve(CLI::App& app, CommonOptions& common, Action& action) {
                         "Address of /metrics, /healthz, /readyz; no token");
     command
         ->add_option("--executor", options->executor,
-                     "Where shards are computed: local, slurm, or a file of command templates (default: in this process)")
+                     "Where shards are computed: local, slurm, or a file of command templates (default: in "
+                     "this process)")
         ->group("Other machines");
-    command->add_option("--shared-folder", options->shared_folder, "Folder that all machines see (default: DATA/shards)")
+    command
+        ->add_option("--shared-folder", options->shared_folder,
+                     "Folder that all machines see (default: DATA/shards)")
         ->group("Other machines");
-    command->add_option("--shard-threads", options->shards.threads, "Threads of each shard")->group("Other machines");
+    command->add_option("--shard-threads", options->shards.threads, "Threads of each shard")
+        ->group("Other machines");
     ServiceLimits& limits = options->limits;
     const auto limit = [&](const char* flag, auto& value, const char* help) {
         command->add_option(flag, value, help)->capture_default_str()->group("Limits");
@@ -161,6 +167,8 @@ void add_serve(CLI::App& app, CommonOptions& common, Action& action) {
           "Of surfaces and results: the least recently used go first");
     limit("--max-event-streams", limits.event_streams, "Open at once");
     add_run_options(*command, common);
+    for (const char* of_one_run : {"--checkpoints", "--no-skip", "--dry-run", "--json", "--quiet"})
+        command->remove_option(command->get_option(of_one_run));
     command->callback(
         [options, &common, &action] { action = [options, &common] { return serve(*options, common); }; });
 }

@@ -5,12 +5,12 @@ import { length, plain } from "./format.js";
 
 // What is shown of the report, if it is there.
 const rows = [
-    ["Points", (r) => r.columns && `${r.columns} × ${r.rows}`],
+    ["Points", (r) => r.nx && `${r.nx} × ${r.ny}`],
     ["Size", (r) => r.width_m && `${length(r.width_m)} × ${length(r.depth_m)}`],
     ["Pitch", (r) => r.pitch_x_m && `${length(r.pitch_x_m)} × ${length(r.pitch_y_m)}`],
-    ["Height, rms", (r) => r.Sq_m !== undefined && length(r.Sq_m)],
+    ["Height, rms", (r) => r.sq_m !== undefined && length(r.sq_m)],
     ["Slope, rms in x and y", (r) => r.rms_slope_x !== undefined && `${plain(r.rms_slope_x)}, ${plain(r.rms_slope_y)}`],
-    ["Steepest slope", (r) => r.steepest_slope_deg !== undefined && `${plain(r.steepest_slope_deg)}°`],
+    ["Steepest slope", (r) => r.max_slope !== undefined && `${plain((Math.atan(r.max_slope) * 180) / Math.PI)}°`],
     ["Jump at the seam", (r) => r.wrap_jump_x !== undefined && `${plain(r.wrap_jump_x)}, ${plain(r.wrap_jump_y)} (1 is seamless)`],
 ];
 

@@ -125,7 +125,7 @@ void Engine::compute(const ClaimedJob& claimed) {
     try {
         const PreparedJob job = prepare(claimed, store_.objects());
         StoredCheckpoints checkpoints(store_, hash);
-        Workplace place{store_.objects(),         options_.run,           monitor, options_.executor.get(),
+        Workplace place{store_.objects(),       options_.run,           monitor, options_.executor.get(),
                         options_.shared_folder, options_.shard_command, &ending_};
         place.options.checkpoints = &checkpoints;
         store_.succeed(hash, job.run(place));

@@ -123,7 +123,8 @@ class ManPages(Folder):
 
     def test_there_is_a_page_for_every_command(self):
         self.assertEqual({path.stem for path in self.folder.iterdir()},
-                         {"gonio", *(f"gonio-{name}" for name in subcommands())})
+                         {"gonio", *(f"gonio-{name}" for name in subcommands()),
+                          *(f"gonio-store-{name}" for name in ("check", "gc", "export"))})
 
     def test_mandoc_has_nothing_to_say(self):
         output("mandoc", "-T", "lint", "-W", "warning", *sorted(self.folder.iterdir()))
