@@ -24,7 +24,7 @@ export function stopBrowser() {
 /** Runs `action(page)` on a page at `url`; no message of the console but those that match one of `allowed` may come. */
 export async function withPage(url, action, { allowed = [], prepare = () => {}, ...options } = {}) {
     const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, reducedMotion: "reduce", ...options });
-    context.setDefaultTimeout(60000);
+    context.setDefaultTimeout(120000);
     const complaints = [];
     try {
         const page = await context.newPage();

@@ -2,6 +2,7 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { createHash } from "node:crypto";
+import { rmSync } from "node:fs";
 import { chmod, mkdtemp, rm, writeFile } from "node:fs/promises";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -10,9 +11,12 @@ import { createInterface } from "node:readline";
 
 const { GONIO } = process.env;
 
-// No server outlives the tests, however they end.
+// No server and no folder outlives the tests, however they end.
 const running = new Set();
-process.on("exit", () => running.forEach((child) => child.kill("SIGKILL")));
+process.on("exit", () => running.forEach((service) => {
+    service.process.kill("SIGKILL");
+    rmSync(service.folder, { recursive: true, force: true });
+}));
 process.once("SIGTERM", () => process.exit(1));
 
 export class Service {
@@ -34,7 +38,7 @@ export class Service {
     async launch(address) {
         this.process = spawn(GONIO, ["serve", "--data", join(this.folder, "data"), "--listen", address, "--threads", "1", ...this.options],
             { stdio: ["ignore", "pipe", "inherit"] });
-        running.add(this.process);
+        running.add(this);
         const [line] = await once(createInterface(this.process.stdout), "line");
         this.url = /^listening on (http:\S+)$/.exec(line)[1];
     }
@@ -44,7 +48,6 @@ export class Service {
         const ended = once(this.process, "exit");
         this.process.kill("SIGKILL");
         await ended;
-        running.delete(this.process);
     }
 
     /** After kill(): the same data at the same address. */
@@ -54,6 +57,7 @@ export class Service {
 
     async stop() {
         await this.kill();
+        running.delete(this);
         await rm(this.folder, { recursive: true });
     }
 
