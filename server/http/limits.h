@@ -18,7 +18,7 @@ struct ServerLimits {
     std::chrono::milliseconds write_grace{20000};
     int requests_per_connection = 1000;
     std::chrono::milliseconds idle_time{30000};  // between two requests; less while others wait for a thread
-    int threads = 128;                           // a connection holds one while it is open
+    int threads = 512;                           // a connection holds one while it is open; 1,000 take 15 MiB
     int waiting = 1024;      // accepted connections without a thread; more stay in the kernel's backlog
     int event_streams = 64;  // each holds a thread, so stay well below `threads`
 };
