@@ -43,26 +43,6 @@ void set_limit(int what, rlim_t most) {
     if (::setrlimit(what, &limit) != 0) throw Error(ErrorCode::internal, "", "", "setrlimit failed");
 }
 
-// From here on: memory, the pipe that is open, the end. No file can be opened, no process started, nothing
-// sent.
-void give_up_system_calls() {
-    const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_KILL_PROCESS);
-    bool ok = filter != nullptr;
-    for (const int call :
-         {SCMP_SYS(write), SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(madvise),
-          SCMP_SYS(futex), SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(getrandom), SCMP_SYS(clock_gettime),
-          SCMP_SYS(sched_yield), SCMP_SYS(rt_sigprocmask)})
-        ok = ok && seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 0) == 0;
-    // Memory that can be executed is not to be had.
-    for (const int call : {SCMP_SYS(mmap), SCMP_SYS(mprotect)})
-        ok =
-            ok && seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 1,
-                                   SCMP_A2(SCMP_CMP_MASKED_EQ, static_cast<scmp_datum_t>(PROT_EXEC), 0)) == 0;
-    ok = ok && seccomp_load(filter) == 0;
-    seccomp_release(filter);
-    if (!ok) throw Error(ErrorCode::internal, "", "", "the system has no seccomp filter");
-}
-
 void write_all(std::string_view bytes) {
     while (!bytes.empty()) {
         const ssize_t n = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
@@ -160,6 +140,24 @@ std::string output_of_child(const std::string& path) {
 }
 
 }  // namespace
+
+void give_up_system_calls() {
+    const scmp_filter_ctx filter = seccomp_init(SCMP_ACT_KILL_PROCESS);
+    bool ok = filter != nullptr;
+    for (const int call :
+         {SCMP_SYS(write), SCMP_SYS(brk), SCMP_SYS(munmap), SCMP_SYS(mremap), SCMP_SYS(madvise),
+          SCMP_SYS(futex), SCMP_SYS(exit), SCMP_SYS(exit_group), SCMP_SYS(getrandom), SCMP_SYS(clock_gettime),
+          SCMP_SYS(sched_yield), SCMP_SYS(rt_sigprocmask)})
+        ok = ok && seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 0) == 0;
+    // Memory that can be executed is not to be had.
+    for (const int call : {SCMP_SYS(mmap), SCMP_SYS(mprotect)})
+        ok =
+            ok && seccomp_rule_add(filter, SCMP_ACT_ALLOW, call, 1,
+                                   SCMP_A2(SCMP_CMP_MASKED_EQ, static_cast<scmp_datum_t>(PROT_EXEC), 0)) == 0;
+    ok = ok && seccomp_load(filter) == 0;
+    seccomp_release(filter);
+    if (!ok) throw Error(ErrorCode::internal, "", "", "the system has no seccomp filter");
+}
 
 int decode_untrusted(const std::string& path) {
     try {

@@ -14,6 +14,10 @@ inline constexpr ReadLimits untrusted_limits{1LL << 26, 1LL << 30};
 // here. A child that breaks its limits or is killed is Error(invalid_input) naming the file.
 RawHeights read_untrusted_heights(const std::string& path);
 
+// From here on this process has memory, the files that are open, and its end: a call that would open a file,
+// start a process or send anything kills it. Throws Error(internal) where the system has no seccomp filters.
+void give_up_system_calls();
+
 // The child's side: decodes the file after giving up everything else, writes the heights to standard output.
 // Returns the exit code.
 int decode_untrusted(const std::string& path);

@@ -1,5 +1,9 @@
 // The service between HTTP and the store: what it describes, what it predicts, what it lets near a file.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -11,6 +15,7 @@
 #include "server/service/openapi.h"
 #include "server/service/processes.h"
 #include "server/service/responses.h"
+#include "server/service/untrusted.h"
 #include "server/service/uploads.h"
 #include "surface/generate.h"
 
@@ -86,6 +91,24 @@ TEST_F(Uploads, AreNamedByHashAndNothingElse) {
     EXPECT_EQ(refusal({{"material", {{"albedo", {{"files", {"/etc/passwd"}}}}}}}), "/material/albedo/files");
     EXPECT_EQ(refusal({{"material", {{"albedo", {{"sha256", {sha256, std::string(64, '0')}}}}}}}),
               "/material/albedo/sha256/1");
+}
+
+// What the decoder of a stranger's file is left with.
+TEST(Untrusted, ChildCanComputeAndNothingElse) {
+    const auto killed = testing::KilledBySignal(SIGSYS);
+    EXPECT_EXIT((give_up_system_calls(), ::open("/dev/null", O_RDONLY), ::_exit(0)), killed, "");
+    EXPECT_EXIT((give_up_system_calls(), ::socket(AF_INET, SOCK_STREAM, 0), ::_exit(0)), killed, "");
+    EXPECT_EXIT((give_up_system_calls(), ::fork(), ::_exit(0)), killed, "");
+    EXPECT_EXIT(
+        (give_up_system_calls(),
+         ::mmap(nullptr, 4096, PROT_READ | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0), ::_exit(0)),
+        killed, "");
+    const auto compute = [] {
+        give_up_system_calls();
+        const std::vector<double> values(1 << 22, 1.0);
+        ::_exit(values.back() == 1.0 ? 7 : 0);
+    };
+    EXPECT_EXIT(compute(), testing::ExitedWithCode(7), "");
 }
 
 TEST(Hillshade, IsBrightTowardsTheLight) {
