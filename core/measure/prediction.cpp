@@ -79,8 +79,8 @@ Prediction predict_brdf(const HeightField& surface, const Material& material, co
         // or the whole.
         worked = window_cells;
         const double needed = runs * std::max(1.0, std::pow(0.0075 / std::max(target, 1e-5), 2));
-        if (needed > most_window_runs && needed * window_cells > runs * cells)
-            worked = cells;
+        if (needed > most_window_runs)  // then every run has more windows, as planning.cpp does it
+            worked = std::min(cells, window_cells * std::pow(std::ceil(std::sqrt(needed / runs)), 2));
         else
             runs = needed;
     }
@@ -93,10 +93,16 @@ Prediction predict_brdf(const HeightField& surface, const Material& material, co
     if (plan.accuracy.max_seconds)
         prediction.cpu_seconds = target > 0 ? std::min(prediction.cpu_seconds, *plan.accuracy.max_seconds)
                                             : *plan.accuracy.max_seconds;
-    const double run_memory = run_bytes(context, settings, static_cast<int>(directions), 0);
+    RunSettings largest = settings;
+    if (worked == cells) largest.tiles_x = largest.tiles_y = 0;
+    // A run is cut to its share; what the whole period's runs keep for the noise bias comes on top
+    // (brdf.cpp).
+    const double one_run = std::min(run_bytes(context, largest, static_cast<int>(directions), 0),
+                                    0.4 * static_cast<double>(max_bytes)),
+                 kept = largest.tiles_x > 0 ? 0 : 8 * runs * directions * cells;
     prediction.table_bytes = size.table_bytes();
-    prediction.memory_bytes = program_bytes + bytes_per_point * cells + size.working_bytes() +
-                              std::min(run_memory, 0.4 * static_cast<double>(max_bytes));
+    prediction.memory_bytes = program_bytes + bytes_per_point * cells + size.working_bytes() + one_run +
+                              (kept < 0.1 * static_cast<double>(max_bytes) ? kept : 0);
     return prediction;
 }
 

@@ -132,6 +132,7 @@ class Run(Program):
         self.write("a.json", job(GROOVE))
         answer = json.loads(self.gonio("run", "a.json", "--dry-run").stdout)
         self.assertEqual(answer["status"], "planned")
+        self.assertGreater(answer["prediction"]["cpu_seconds"], 0)
         self.assertEqual(answer["job"]["measure"]["accuracy"], {"seed": 1, "target_relative_error": 0.01})
         self.assertEqual(self.files(), ["a.json"])
         done = json.loads(self.gonio("run", "a.json", "--json").stdout)
