@@ -155,6 +155,17 @@ class Ends(Service):
         self.assertEqual([self.wait(job)["status"] for job in jobs], ["successful"] * 2)
         self.assertEqual(self.table(jobs[0]), self.local(MEDIUM))
 
+    def test_shards_of_an_executor_have_the_same_bytes(self):
+        self.restart("--executor", "local", "--shared-folder", str(self.folder / "shared"))
+        digest = hashlib.sha256(LAVA.read_bytes()).hexdigest()
+        self.call("PUT", f"/surfaces/{digest}", LAVA.read_bytes())
+        units = {"width": "50mm", "height_range": "5mm", "resample": [64, 64]}
+        accuracy = {"accuracy": {"target_relative_error": 0.02}}
+        job = self.submit({**JOB, **accuracy, "surface": {"sha256": digest, **units}})["jobID"]
+        self.assertEqual(self.wait(job)["status"], "successful")
+        self.assertEqual(self.table(job), self.local({**JOB, **accuracy, "surface": {"file": str(LAVA), **units}}))
+        self.assertEqual(list((self.folder / "shared").iterdir()), [])
+
     def test_sigterm_drains(self):
         job = self.submit(MEDIUM)["jobID"]
         time.sleep(0.7)
