@@ -28,7 +28,7 @@ class Conformance(Service):
         cls.shared.doCleanups()
 
     def setUp(self):
-        self.port = self.shared.port
+        self.daemon = self.shared.daemon
 
     def get(self, path, status=200, **headers):
         code, body = self.call("GET", path, **headers)

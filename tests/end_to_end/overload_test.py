@@ -8,17 +8,15 @@ is accepted at the first attempt.
 Usage: overload_test.py GONIO SOURCE_FOLDER [--seconds N]
 """
 import argparse
-import http.client
-import json
 import os
 import pathlib
-import re
 import shutil
-import subprocess
 import sys
 import tempfile
 import threading
 import time
+
+from daemon import Daemon
 
 parser = argparse.ArgumentParser()
 parser.add_argument("gonio")
@@ -36,33 +34,16 @@ def job(seed):
             "measure": {"kind": "brdf", "incident": DIRECTIONS, "outgoing": DIRECTIONS}, "accuracy": {"seed": seed}}
 
 
-def ask(port, method, path, body=None):
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
-    try:
-        connection.request(method, path, None if body is None else json.dumps(body), {} if body is None else {"Content-Type": "application/json"})
-        response = connection.getresponse()
-        return response.status, response.headers, json.loads(response.read())
-    finally:
-        connection.close()
-
-
-def memory_mib(process):
-    return int(re.search(r"VmRSS:\s+(\d+)", pathlib.Path(f"/proc/{process.pid}/status").read_text()).group(1)) / 1024
-
-
 def main():
     folder = pathlib.Path(tempfile.mkdtemp(prefix="gonio_overload_"))
-    process = subprocess.Popen([os.path.abspath(arguments.gonio), "serve", "--data", str(folder / "data"), "--listen", "127.0.0.1:0",
-                                "--threads", "1", "--max-queue", str(QUEUE), "--max-jobs-per-token", "100000"],
-                               stdout=subprocess.PIPE, text=True)
+    daemon = Daemon(os.path.abspath(arguments.gonio), folder / "data")
+    daemon.start("--max-queue", str(QUEUE), "--max-jobs-per-token", "100000")
     faults, accepted, refused, stop = [], [], [], threading.Event()
     try:
-        port = int(process.stdout.readline().rsplit(":", 1)[1])
-
         def load(k):
             seed = k * 10**6
             while not stop.is_set():
-                status, headers, body = ask(port, "POST", "/processes/brdf/execution", {"inputs": job(seed)})
+                status, headers, body = daemon.ask("POST", "/processes/brdf/execution", {"inputs": job(seed)})
                 seed += 1
                 if status == 201:
                     accepted.append(body["jobID"])
@@ -79,20 +60,20 @@ def main():
         memory = []
         for _ in range(10):
             time.sleep(arguments.seconds / 10)
-            memory.append(memory_mib(process))
+            memory.append(daemon.memory_mib())
         stop.set()
         for thread in threads:
             thread.join()
         begin, status = time.monotonic(), 429
         while status == 429 and time.monotonic() < begin + 60:  # until one job of the full queue is done
             time.sleep(0.02)
-            status, _, body = ask(port, "POST", "/processes/brdf/execution", {"inputs": job(1)})
+            status, _, body = daemon.ask("POST", "/processes/brdf/execution", {"inputs": job(1)})
         recovery = time.monotonic() - begin
         if status != 201:
             faults.append(f"not back after 60 s: {status} {body}")
         end = time.monotonic() + 120
         for identifier in accepted:
-            while (info := ask(port, "GET", f"/jobs/{identifier}")[2]).get("status") in ("accepted", "running") and time.monotonic() < end:
+            while (info := daemon.ask("GET", f"/jobs/{identifier}")[2]).get("status") in ("accepted", "running") and time.monotonic() < end:
                 time.sleep(0.01)
             if info.get("status") != "successful":
                 faults.append(str(info))
@@ -107,8 +88,7 @@ def main():
         return 1 if faults else 0
     finally:
         stop.set()
-        process.kill()
-        process.wait()
+        daemon.kill()
         shutil.rmtree(folder)
 
 

@@ -5,7 +5,6 @@ Usage: remote_cli_test.py GONIO SOURCE_FOLDER [unittest options]
 """
 import json
 import shutil
-import socket
 import subprocess
 import unittest
 
@@ -66,17 +65,12 @@ class Remote(Service):
         (self.folder / "job.json").write_text(json.dumps(MEDIUM))
         self.write(MEDIUM, [{"format": "csv", "path": "a.csv"}])
         self.kill()
-        with socket.socket() as probe:  # an address that stays the same
-            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
+        port = self.daemon.port
         client = subprocess.Popen([GONIO, "run", "job.json", "-o", "remote", "-q", "--server", f"http://127.0.0.1:{port}"],
                                   cwd=self.folder)  # nobody there yet
         self.addCleanup(client.wait)
         self.addCleanup(client.kill)
-        self.process = subprocess.Popen([GONIO, "serve", "--data", str(self.folder / "data"), "--listen",
-                                         f"127.0.0.1:{port}", "--threads", "1"], stdout=subprocess.PIPE, text=True)
-        self.process.stdout.readline()
+        self.daemon.start(port=port)
         self.assertEqual(client.wait(120), 0)
         self.gonio("run", "job.json", "-o", "local", "-q")
         self.assertEqual((self.folder / "local/a.csv").read_bytes(), (self.folder / "remote/a.csv").read_bytes())

@@ -114,7 +114,7 @@ class Api(Service):
     def test_events(self):
         # A stream may leave out what lasted less than half a second, so: a job that only ends when it is told to.
         job = self.submit(LONG)["jobID"]
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=120)
+        connection = http.client.HTTPConnection("127.0.0.1", self.daemon.port, timeout=120)
         self.addCleanup(connection.close)
         connection.request("GET", f"/jobs/{job}/events")
         response = connection.getresponse()
@@ -170,10 +170,10 @@ class Ends(Service):
         job = self.submit(MEDIUM)["jobID"]
         time.sleep(0.7)
         begin = time.monotonic()
-        self.process.send_signal(signal.SIGTERM)
-        self.assertEqual(self.process.wait(20), 0)
+        self.daemon.process.send_signal(signal.SIGTERM)
+        self.assertEqual(self.daemon.process.wait(20), 0)
         self.assertLess(time.monotonic() - begin, 10)
-        self.process.stdout.close()
+        self.daemon.process.stdout.close()
         self.start()
         self.assertEqual(self.wait(job)["status"], "successful")
         self.assertEqual(self.table(job), self.local(MEDIUM))

@@ -2,17 +2,17 @@
 
 The programs that import this are called with GONIO SOURCE_FOLDER [unittest options].
 """
-import http.client
 import json
 import os
 import pathlib
-import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+
+from daemon import Daemon
 
 GONIO = os.path.abspath(sys.argv.pop(1))
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -37,39 +37,27 @@ class Service(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="gonio_serve_"))
         self.addCleanup(shutil.rmtree, self.folder)
-        self.process = None
-        self.start()
+        self.daemon = Daemon(GONIO, self.folder / "data")
+        self.daemon.start()
         self.addCleanup(self.kill)
 
     def start(self, *options):
-        self.process = subprocess.Popen([GONIO, "serve", "--data", str(self.folder / "data"), "--listen", "127.0.0.1:0",
-                                         "--threads", "1", *options], stdout=subprocess.PIPE, text=True)
-        line = self.process.stdout.readline()
-        self.port = int(re.fullmatch(r"listening on http://127\.0\.0\.1:(\d+)\n", line).group(1))
-        self.url = f"http://127.0.0.1:{self.port}"
+        self.daemon.start(*options)
+
+    def kill(self):
+        self.daemon.kill()
 
     def restart(self, *options):
         self.kill()
         self.start(*options)
 
-    def kill(self):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
-        self.process.stdout.close()
+    @property
+    def url(self):
+        return self.daemon.url
 
     def call(self, method, path, body=None, **headers):
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
-        if isinstance(body, dict):
-            body = json.dumps(body)
-            headers.setdefault("Content-Type", "application/json")
-        connection.request(method, path, body, {name.replace("_", "-"): value for name, value in headers.items()})
-        response = connection.getresponse()
-        data = response.read()
-        connection.close()
-        self.headers = response.headers
-        is_json = "json" in (response.headers["Content-Type"] or "")
-        return response.status, json.loads(data) if is_json and data else data
+        status, self.headers, answer = self.daemon.ask(method, path, body, **headers)
+        return status, answer
 
     def submit(self, inputs, **headers):
         status, info = self.call("POST", "/processes/brdf/execution", {"inputs": inputs}, **headers)
@@ -91,7 +79,7 @@ class Service(unittest.TestCase):
         self.assertEqual(status, 200, data)
         return data
 
-    def local(self, inputs, files={}):
+    def local(self, inputs):
         """The bytes of `gonio run` for the same job."""
         (self.folder / "job.json").write_text(json.dumps(inputs | {"output": [{"format": "csv", "path": "local.csv"}]}))
         subprocess.run([GONIO, "run", "job.json", "-q", "--threads", "2"], cwd=self.folder, check=True)

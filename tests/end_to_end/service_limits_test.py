@@ -177,15 +177,11 @@ class Limits(Service):
         self.assertEqual(self.call("GET", "/healthz")[0], 200)
 
     def test_metrics(self):
-        self.kill()
-        self.process = subprocess.Popen([GONIO, "serve", "--data", str(self.folder / "data"), "--listen", "127.0.0.1:0",
-                                         "--admin-listen", "127.0.0.1:0", "--threads", "1"],
-                                        stdout=subprocess.PIPE, text=True)
-        self.port = int(self.process.stdout.readline().rsplit(":", 1)[1])
-        service, self.admin = self.port, int(self.process.stdout.readline().rsplit(":", 1)[1])
+        self.restart("--admin-listen", "127.0.0.1:0")
+        service, admin = self.daemon.port, int(self.daemon.process.stdout.readline().rsplit(":", 1)[1])
         self.submit(JOB, Prefer="wait=30")
         self.assertEqual(self.call("GET", "/metrics")[0], 404)  # not for everybody
-        self.port = self.admin
+        self.daemon.port = admin
         end = time.monotonic() + 10
         while True:  # a computation is counted just after its job has ended
             status, text = self.call("GET", "/metrics")
@@ -197,7 +193,7 @@ class Limits(Service):
         self.assertEqual(float(lines['gonio_http_requests_total{method="POST",route="/processes",status="201"}']), 1)
         self.assertGreater(float(lines["process_resident_memory_bytes"]), 1e6)
         self.assertEqual(self.call("GET", "/readyz")[0], 200)
-        self.port = service
+        self.daemon.port = service
 
     def test_retention(self):
         job = self.submit(JOB, Prefer="wait=30")["jobID"]
