@@ -25,6 +25,7 @@ void Api::add_surfaces() {
     server_.route("GET", "/surfaces/{}", [this](Request& request) {
         const std::string& sha256 = request.captures[0];
         if (!store_.has_surface(sha256)) http::fail(404, "there is no surface " + sha256);
+        store_.touch_surface(sha256);
         http::FileOffer offer;
         offer.sha256 = sha256;
         offer.immutable = true;

@@ -224,5 +224,16 @@ class Limits(Service):
         self.assertEqual(self.table(job), self.local(JOB))  # the old job has its results again
 
 
+    def test_a_surface_that_is_read_stays_longer(self):
+        older, newer = self.put(b"1 2\n3 4\n"), self.put(b"5 6\n7 8\n")
+        time.sleep(0.01)  # times are kept to the millisecond
+        self.assertEqual(self.call("GET", f"/surfaces/{older}")[0], 200)
+        self.put(b"9")  # what is written next takes the time of the reading along
+        self.kill()
+        subprocess.run([GONIO, "store", "gc", "--data", self.folder / "data", "--quota-bytes", "9"], check=True, capture_output=True)
+        self.start()
+        self.assertEqual([self.call("HEAD", f"/surfaces/{name}")[0] for name in (older, newer)], [200, 404])
+
+
 if __name__ == "__main__":
     unittest.main()
