@@ -5,12 +5,6 @@
 
 namespace gonio::http {
 
-std::string read_text(Request& request, uint64_t most) {
-    std::string text;
-    copy_body(request, most, [&text](std::string_view piece) { text += piece; });
-    return text;
-}
-
 nlohmann::json read_json(Request& request, uint64_t most) {
     const std::string header = request.header("Content-Type");
     const std::string_view type = trimmed(std::string_view(header).substr(0, header.find(';')));
@@ -20,7 +14,9 @@ nlohmann::json read_json(Request& request, uint64_t most) {
                           equal_ignoring_case(type.substr(0, family.size()), family) &&
                           equal_ignoring_case(type.substr(type.size() - suffix.size()), suffix));
     if (!is_json) fail(415, "the body must be application/json");
-    return parse_json_strictly(read_text(request, most), {static_cast<size_t>(most), most_json_depth});
+    std::string text;
+    copy_body(request, most, [&text](std::string_view piece) { text += piece; });
+    return parse_json_strictly(text, {static_cast<size_t>(most), most_json_depth});
 }
 
 }  // namespace gonio::http

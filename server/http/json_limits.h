@@ -12,9 +12,6 @@ namespace gonio::http {
 // Deeper than any document of ours, far from where nlohmann's recursive dump() overflows the stack.
 constexpr int most_json_depth = 64;
 
-// The whole body, at most `most` bytes: for documents, not for uploads. Throws Failure(413).
-std::string read_text(Request& request, uint64_t most);
-
 // What parse_json_strictly() refuses (keys written twice, depth, invalid UTF-8, text behind the value) is
 // thrown as its Error, before any value has been copied or printed. Throws Failure: 415 unless the body is
 // application/json or application/*+json, 413 above `most` bytes.
