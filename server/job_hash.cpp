@@ -74,4 +74,15 @@ std::string job_hash(const std::string& surface_hash, const Material& material, 
     return sha256_hex(canonical_job(surface_hash, material, plan, reference));
 }
 
+std::string runs_hash(const std::string& surface_hash, const Material& material, MeasurePlan plan,
+                      const ReferenceOptions* reference) {
+    std::visit(
+        [](auto& kind) {
+            kind.accuracy.target_relative_error.reset();
+            kind.accuracy.max_seconds.reset();
+        },
+        plan);
+    return job_hash(surface_hash, material, plan, reference);
+}
+
 }  // namespace gonio

@@ -21,4 +21,9 @@ std::string canonical_job(const std::string& surface_hash, const Material& mater
 std::string job_hash(const std::string& surface_hash, const Material& material, const MeasurePlan& plan,
                      const ReferenceOptions* reference = nullptr);
 
+// The same without what only says when to stop (target_relative_error, max_seconds): jobs of equal runs hash
+// can have runs in common.
+std::string runs_hash(const std::string& surface_hash, const Material& material, MeasurePlan plan,
+                      const ReferenceOptions* reference = nullptr);
+
 }  // namespace gonio

@@ -39,9 +39,11 @@ BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOpti
 }  // namespace
 
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference) {
-    LoadedJob loaded{job, load_surface(job.surface), {}, reference, ""};
+    LoadedJob loaded{job, load_surface(job.surface), {}, reference};
     loaded.material = load_material(job.material, job.surface, loaded.surface);
-    loaded.hash = job_hash(loaded.surface.hash, loaded.material, job.plan, reference ? &*reference : nullptr);
+    const ReferenceOptions* options = reference ? &*reference : nullptr;
+    loaded.hash = job_hash(loaded.surface.hash, loaded.material, job.plan, options);
+    loaded.runs_hash = runs_hash(loaded.surface.hash, loaded.material, job.plan, options);
     return loaded;
 }
 

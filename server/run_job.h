@@ -17,7 +17,8 @@ struct LoadedJob {
     LoadedSurface surface;
     Material material;
     std::optional<ReferenceOptions> reference;  // run by the path tracer instead of the fast engine
-    std::string hash;                           // job_hash
+    std::string hash = {};                      // job_hash
+    std::string runs_hash = {};
 };
 
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference = std::nullopt);

@@ -164,7 +164,7 @@ void add_serve(CLI::App& app, CommonOptions& common, Action& action) {
     limit("--max-queue", limits.queued_jobs, "Jobs in the queue");
     limit("--max-jobs-per-token", limits.jobs_per_user, "Unfinished jobs of a token");
     limit("--store-quota-bytes", limits.stored_bytes,
-          "Of surfaces and results: the least recently used go first");
+          "Of what is kept: checkpoints go first, then results and surfaces that were not used for long");
     limit("--max-event-streams", limits.event_streams, "Open at once");
     add_run_options(*command, common);
     for (const char* of_one_run : {"--checkpoints", "--no-skip", "--dry-run", "--json", "--quiet"})

@@ -24,7 +24,7 @@ struct ShardedJob {
 };
 
 void print_missing(const MissingShards& missing) {
-    for (const int i : missing.indices()) std::cout << i << "\n";
+    for (const Shard& shard : missing.shards()) std::cout << shard.index << "\n";
     std::cout << std::flush;
 }
 

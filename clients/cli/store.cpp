@@ -35,6 +35,7 @@ int collect_garbage(const StoreFlags& flags) {
     const GcReport report = Store({flags.data}).gc(flags.quota_bytes);
     std::cout << ordered_json{{"bytes_before", report.bytes_before},
                               {"bytes_after", report.bytes_after},
+                              {"checkpoints_removed", report.checkpointed},
                               {"results_removed", report.results},
                               {"surfaces_removed", report.surfaces},
                               {"objects_removed", report.objects}}

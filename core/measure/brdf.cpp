@@ -21,6 +21,13 @@ namespace {
 
 constexpr int most_stages = 12;
 
+// At most 5 % of the target, in steps: jobs whose targets lie between two of them can have runs in common.
+double series_tolerance(double target) {
+    for (const double tolerance : {5e-5, 1e-5})
+        if (tolerance <= 0.05 * target) return tolerance;
+    return 1e-6;
+}
+
 // Everything that one measurement carries from stage to stage.
 class Measurement {
   public:
@@ -145,7 +152,7 @@ class Measurement {
         } else {
             skipped_bound_ = 0;
         }
-        context_.series_tolerance = std::clamp(0.05 * target(), 1e-6, 1e-3);
+        context_.series_tolerance = series_tolerance(target());
         if (context_.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
     }
 
@@ -165,6 +172,11 @@ class Measurement {
     }
 
     void measure();
+    // Of a part of the stage, for every job that comes to the same stage by the same settings.
+    std::string part_key(const Stage& stage, const std::string& part) const {
+        return "stage" + std::to_string(stage.number) + "-" + part + "-" +
+               settings_key(context_, stage.settings);
+    }
     void run_stage(Stage& stage, int n_runs);
     void find_mesh_bias(const std::vector<Stage>& stages);
     bool ends_in_time(const Stage& stage, NextStep& step) const;
@@ -183,6 +195,7 @@ class Measurement {
     MeshBias mesh_bias_;
     double seconds_per_run_ = 0;
     RunValues totals_;  // counters of all runs
+    int runs_found_ = 0;
     std::mutex mutex_;
 };
 
@@ -217,11 +230,15 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
                          "runs of stage " + std::to_string(stage.number + 1), result_.report.relative_error});
     };
     auto run_batch = [&](int offset, int n) {
-        const Shards::Batch batch = shards_.take(n);
+        std::vector<std::string> keys;
+        for (int k = 0; k < n; ++k)
+            keys.push_back(part_key(stage, "run" + std::to_string(first + offset + k)));
+        const Shards::Batch batch = shards_.take(std::move(keys));
         for (int k = 0; k < n; ++k)
             if (batch.saved[k]) runs[offset + k] = run_values_from(*batch.saved[k]);
         const int n_new = static_cast<int>(batch.to_compute.size()), side_by_side = std::min(outer, n_new);
         done += n - n_new;
+        runs_found_ += n - n_new;
         parallel_for(n_new, outer, [&](int k) {
             run(batch, offset, batch.to_compute[k], std::max(1, options_.n_threads / side_by_side));
         });
@@ -237,7 +254,7 @@ void Measurement::run_stage(Stage& stage, int n_runs) {
     run_batch(alone, n_runs - alone);
     seconds_per_run_ = (seconds() - began) / n_runs * outer;
     if (transport && !stage.noise && !context_.keep_first)
-        stage.noise = noise_bias_from(shards_.part("noise-" + std::to_string(stage.number), [&] {
+        stage.noise = noise_bias_from(shards_.part(part_key(stage, "noise"), [&] {
             return to_bytes(measure_noise_bias(context_, stage.settings, options_.n_threads, monitor_));
         }));
     if (context_.keep_first) {
@@ -283,7 +300,7 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
         return;
     }
     const double albedo = scene_.material.is_map() ? 1.0 : albedo_range().second;
-    mesh_bias_ = mesh_bias_from(shards_.part("mesh-" + std::to_string(stages.back().number), [&] {
+    mesh_bias_ = mesh_bias_from(shards_.part(part_key(stages.back(), "mesh"), [&] {
         return to_bytes(measure_mesh_bias(context_, stages.back().settings, albedo * stages.back().ratio,
                                           options_.n_threads, monitor_));
     }));
@@ -375,6 +392,9 @@ void Measurement::measure() {
     report.relative_error = e.total;
     report.target_met = wanted == 0 || e.total <= wanted;
     describe_runs(context_, stages, mesh_bias_, totals_, report);
+    if (runs_found_ > 0)
+        report.skipped.push_back({std::to_string(runs_found_) + " runs",
+                                  "a checkpoint had them, of this job or of one with another target"});
     report.seconds.emplace_back("wall", seconds());
     if (!report.target_met)
         report.warnings.push_back("target_relative_error " + number(wanted) +

@@ -107,7 +107,9 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
     };
     // A view is a shard.
     Shards shards(options.checkpoints, options.shard_task);
-    const Shards::Batch batch = shards.take(static_cast<int>(views.size()));
+    std::vector<std::string> keys;
+    for (size_t v = 0; v < views.size(); ++v) keys.push_back("view" + std::to_string(v));
+    const Shards::Batch batch = shards.take(std::move(keys));
     for (size_t v = 0; v < views.size(); ++v)
         if (batch.saved[v]) write_view(views[v], path_tally_from(*batch.saved[v]));
 

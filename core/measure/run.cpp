@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "base/random.h"
+#include "base/sha256.h"
 #include "measure/windows.h"
 
 namespace gonio {
@@ -219,6 +221,24 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
     const double links =
         unknowns * settings.directions / (settings.refinement * settings.refinement) * 0.35 * sizeof(Link);
     return copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
+}
+
+std::string settings_key(const RunContext& context, const RunSettings& settings) {
+    const double numbers[] = {static_cast<double>(settings.sub_samples),
+                              static_cast<double>(settings.directions),
+                              static_cast<double>(settings.refinement),
+                              static_cast<double>(settings.tiles_x),
+                              static_cast<double>(settings.tiles_y),
+                              static_cast<double>(context.indirect),
+                              static_cast<double>(context.skip_steep),
+                              static_cast<double>(context.keep_orders),
+                              static_cast<double>(!context.view_to_light.empty()),
+                              static_cast<double>(context.fixed_applications),
+                              static_cast<double>(context.single_orders),
+                              static_cast<double>(context.keep_first),
+                              static_cast<double>(context.max_bytes),
+                              context.series_tolerance};
+    return sha256_hex(bytes_of(numbers, std::size(numbers))).substr(0, 16);
 }
 
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,

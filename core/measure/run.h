@@ -1,6 +1,7 @@
 // One randomised run of the fast engine: a complete, unbiased table from one random shift of everything that
 // is shared. Independent runs give the mean and its standard error (Cranley-Patterson; design 3.3).
 #pragma once
+#include <string>
 #include <vector>
 
 #include "base/monitor.h"
@@ -72,6 +73,10 @@ struct RunValues {
 // run: number of the run inside its stage; (seed, stage, run) key its random numbers.
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
                    const Monitor& monitor);
+
+// What decides the bits of a run beside the job, the stage and the number of the run, and of that what a job
+// with another target may have in common with this one; 16 hex digits.
+std::string settings_key(const RunContext& context, const RunSettings& settings);
 
 // n places inside the facets: the R2 sequence (Roberts 2018) from a random start.
 std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b);

@@ -4,22 +4,20 @@
 
 namespace gonio {
 
-std::string shard_key(int index) {
-    return "shard-" + std::to_string(index);
-}
-
-MissingShards::MissingShards(std::vector<int> which) : indices_(std::move(which)) {
+MissingShards::MissingShards(std::vector<Shard> which) : shards_(std::move(which)) {
     text_ = "shards that are not there yet:";
-    for (const int i : indices_) text_ += " " + std::to_string(i);
+    for (const Shard& shard : shards_) text_ += " " + std::to_string(shard.index);
 }
 
-Shards::Batch Shards::take(int n) {
+Shards::Batch Shards::take(std::vector<std::string> keys) {
+    const int n = static_cast<int>(keys.size());
     Batch batch;
     batch.first = taken_;
+    batch.keys = std::move(keys);
     batch.saved.resize(n);
     taken_ += n;
     for (int k = 0; k < n; ++k) {
-        if (checkpoints_) batch.saved[k] = checkpoints_->load(shard_key(batch.first + k));
+        if (checkpoints_) batch.saved[k] = checkpoints_->load(batch.keys[k]);
         if (!batch.saved[k]) batch.to_compute.push_back(k);
     }
     if (task_.kind == ShardTask::Kind::compute_all) return batch;
@@ -28,15 +26,15 @@ Shards::Batch Shards::take(int n) {
         if (batch.saved[wanted]) throw ShardDone();
         batch.to_compute = {wanted};
     } else if (!batch.to_compute.empty()) {
-        std::vector<int> missing = batch.to_compute;
-        for (int& k : missing) k += batch.first;
+        std::vector<Shard> missing;
+        for (const int k : batch.to_compute) missing.push_back({batch.first + k, batch.keys[k]});
         throw MissingShards(std::move(missing));
     }
     return batch;
 }
 
 void Shards::save(const Batch& batch, int position, const std::string& bytes) {
-    if (checkpoints_) checkpoints_->save(shard_key(batch.first + position), bytes);
+    if (checkpoints_) checkpoints_->save(batch.keys[position], bytes);
 }
 
 void Shards::finish(const Batch& batch) const {

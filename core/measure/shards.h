@@ -11,7 +11,8 @@
 
 namespace gonio {
 
-// Where finished parts are kept. Both may be called from several threads at once.
+// Where finished parts are kept, under keys that say what decided them: a part serves every job of which it is
+// a part. Both may be called from several threads at once.
 class Checkpoints {
   public:
     virtual ~Checkpoints() = default;
@@ -20,9 +21,6 @@ class Checkpoints {
     virtual void save(const std::string& key, const std::string& bytes) = 0;
 };
 
-// The key of a shard.
-std::string shard_key(int index);
-
 // What a process does about shards that are not there yet.
 struct ShardTask {
     enum class Kind { compute_all, compute_one, compute_none };
@@ -30,15 +28,20 @@ struct ShardTask {
     int index = 0;  // for compute_one
 };
 
+struct Shard {
+    int index;        // in the order in which a measurement comes to need them
+    std::string key;  // under which it is kept: a name for a file
+};
+
 // Thrown by compute_none, and by compute_one if its shard cannot be planned before these are there.
 class MissingShards : public std::exception {
   public:
-    explicit MissingShards(std::vector<int> which);
-    const std::vector<int>& indices() const { return indices_; }
+    explicit MissingShards(std::vector<Shard> which);
+    const std::vector<Shard>& shards() const { return shards_; }
     const char* what() const noexcept override { return text_.c_str(); }
 
   private:
-    std::vector<int> indices_;
+    std::vector<Shard> shards_;
     std::string text_;
 };
 
@@ -53,13 +56,14 @@ class Shards {
   public:
     Shards(Checkpoints* checkpoints, const ShardTask& task) : checkpoints_(checkpoints), task_(task) {}
 
-    // The next n shards.
+    // The next shards, by their keys.
     struct Batch {
         int first = 0;
+        std::vector<std::string> keys;
         std::vector<std::optional<std::string>> saved;  // what is there already
         std::vector<int> to_compute;                    // positions 0 .. n - 1
     };
-    Batch take(int n);
+    Batch take(std::vector<std::string> keys);
     // A shard that was computed; from any thread.
     void save(const Batch& batch, int position, const std::string& bytes);
     // After the last save of a batch.

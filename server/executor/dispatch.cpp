@@ -15,6 +15,7 @@ using namespace std::chrono_literals;
 constexpr int polls_until_lost = 2;
 
 struct WantedShard {
+    std::string key;
     int attempts = 0;  // submissions, by whomever
     int unseen = 0;    // polls in a row that did not know it
     bool failed = false;
@@ -28,16 +29,16 @@ class Dispatcher {
         : job_(job), executor_(executor), checkpoints_(checkpoints), monitor_(monitor) {}
 
     // Returns when all of them are there.
-    void compute(const std::vector<int>& indices) {
-        known_ = std::max(known_, 1 + *std::max_element(indices.begin(), indices.end()));
+    void compute(const std::vector<Shard>& shards) {
+        known_ = std::max(known_, 1 + shards.back().index);
         std::map<int, WantedShard> wanted;
-        for (const int index : indices) {
-            wanted[index];
+        for (const auto& [index, key] : shards) {
+            wanted[index].key = key;
             job_.forget_failure(index);  // of an earlier start
         }
         for (;;) {
             std::erase_if(wanted,
-                          [&](const auto& shard) { return checkpoints_.load(shard_key(shard.first)); });
+                          [&](const auto& shard) { return checkpoints_.load(shard.second.key); });
             report(wanted.size());
             if (wanted.empty()) return;
             for (auto& [index, shard] : wanted) look_for_failure(index, shard);
@@ -164,7 +165,7 @@ BrdfResult dispatch(const LoadedJob& loaded, const JobFolder& job, Executor& exe
                 cancel(executor, job);  // shards that were thought lost, and run twice
                 return result;
             } catch (const MissingShards& missing) {
-                dispatcher.compute(missing.indices());
+                dispatcher.compute(missing.shards());
             }
         }
     } catch (const Error& error) {

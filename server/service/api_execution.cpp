@@ -139,6 +139,7 @@ Response Api::execute(Request& request) {
         const std::shared_ptr<void> done(nullptr, [this](void*) { preparing_.release(); });
         PreparedJob prepared = prepare(*process, job.document, store_.objects());
         job.job_hash = prepared.job_hash;
+        job.runs_hash = prepared.runs_hash;
         job.surfaces = std::move(prepared.surfaces);
         check_prediction(prepared, limits_);
     }

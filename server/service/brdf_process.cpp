@@ -60,6 +60,7 @@ PreparedJob prepare(json document, std::optional<ReferenceOptions> reference, Ob
     const auto& plan = std::get<BrdfPlan>(loaded->job.plan);
     PreparedJob prepared;
     prepared.job_hash = loaded->hash;
+    prepared.runs_hash = loaded->runs_hash;
     prepared.surfaces = files.surfaces;
     if (reference) {
         prepared.prediction = predict_reference(loaded->surface.surface, loaded->material, plan, *reference);

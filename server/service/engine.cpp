@@ -20,12 +20,13 @@ double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Checkpoints of one job in the store.
+// Checkpoints of one job in the store, and those of its equals but for the target.
 class StoredCheckpoints : public Checkpoints {
   public:
-    StoredCheckpoints(Store& store, std::string job_hash) : store_(store), job_hash_(std::move(job_hash)) {}
+    StoredCheckpoints(Store& store, const PreparedJob& job)
+        : store_(store), job_hash_(job.job_hash), runs_hash_(job.runs_hash) {}
     std::optional<std::string> load(const std::string& key) override {
-        const std::optional<Checkpoint> saved = store_.load_checkpoint(job_hash_, key);
+        const std::optional<Checkpoint> saved = store_.load_checkpoint(runs_hash_, key);
         if (!saved) return std::nullopt;
         std::ifstream in(store_.objects().path(saved->sha256), std::ios::binary);
         std::string bytes{std::istreambuf_iterator<char>(in), {}};
@@ -34,12 +35,12 @@ class StoredCheckpoints : public Checkpoints {
         return bytes;
     }
     void save(const std::string& key, const std::string& bytes) override {
-        store_.save_checkpoint(job_hash_, key, store_.objects().put(bytes));
+        store_.save_checkpoint(job_hash_, runs_hash_, key, store_.objects().put(bytes));
     }
 
   private:
     Store& store_;
-    std::string job_hash_;
+    std::string job_hash_, runs_hash_;
 };
 
 PreparedJob prepare(const ClaimedJob& claimed, Objects& objects) {
@@ -124,7 +125,7 @@ void Engine::compute(const ClaimedJob& claimed) {
     std::optional<Error> failure;
     try {
         const PreparedJob job = prepare(claimed, store_.objects());
-        StoredCheckpoints checkpoints(store_, hash);
+        StoredCheckpoints checkpoints(store_, job);
         Workplace place{store_.objects(),       options_.run,           monitor, options_.executor.get(),
                         options_.shared_folder, options_.shard_command, &ending_};
         place.options.checkpoints = &checkpoints;

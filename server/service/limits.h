@@ -12,7 +12,7 @@ struct ServiceLimits {
     double job_seconds = 24 * 3600;             // of computing: predicted before, stopped after
     int64_t queued_jobs = 1000;
     int64_t jobs_per_user = 200;                // queued or running
-    int64_t stored_bytes = int64_t{100} << 30;  // of surfaces and results: the least recently used go first
+    int64_t stored_bytes = int64_t{100} << 30;  // of what is kept: checkpoints go first, then the least recently used
     int event_streams = 64;
 };
 

@@ -28,21 +28,12 @@ bool is_file_name(const std::string& name) {
            name != "document.json" && name != "SHA256SUMS";  // what an export adds
 }
 
-void drop_checkpoints(Database& database, const std::string& job_hash) {
-    Statement(database, "DELETE FROM checkpoints WHERE job_hash=?", job_hash).run();
-}
-
-void drop_unneeded_checkpoints(Database& database, const std::string& job_hash) {
-    if (!has_unfinished_job(database, job_hash)) drop_checkpoints(database, job_hash);
-}
-
 void dismiss_stopped(Database& database, const std::string& job_hash, int64_t at) {
     Statement(database,
               "UPDATE jobs SET status='dismissed', finished=?, updated=?, version=version+1 "
               "WHERE job_hash=? AND status='running' AND stop_requested",
               at, at, job_hash)
         .run();
-    drop_unneeded_checkpoints(database, job_hash);
 }
 
 // Ends every unfinished job of the hash. One that was told to stop is dismissed, however its computation
@@ -57,7 +48,6 @@ void end_jobs(Database& database, const std::string& job_hash, JobStatus status,
               std::string(status_name(status)), message, problem, int{status == JobStatus::successful}, at,
               at, at, job_hash)
         .run();
-    drop_checkpoints(database, job_hash);
 }
 
 std::string problem_of_deaths(int attempts) {
@@ -97,10 +87,10 @@ Acceptance Store::accept(const NewJob& job) {
         const bool known = database.changed_rows() > 0;
         Statement(
             database,
-            "INSERT INTO jobs(id, process, document, job_hash, status, message, created, updated, owner, "
-            "idempotency_key, request_hash) VALUES(?,?,?,?,'accepted',?,?,?,?,?,?)",
-            id, job.process, job.document, job.job_hash, job.message, at, at, job.owner, job.idempotency_key,
-            job.request_hash)
+            "INSERT INTO jobs(id, process, document, job_hash, runs_hash, status, message, created, updated, "
+            "owner, idempotency_key, request_hash) VALUES(?,?,?,?,?,'accepted',?,?,?,?,?,?)",
+            id, job.process, job.document, job.job_hash, job.runs_hash, job.message, at, at, job.owner,
+            job.idempotency_key, job.request_hash)
             .run();
         if (known) end_jobs(database, job.job_hash, JobStatus::successful, job.message, {}, at);
         const StoredJob stored = *find_job(database, id);
@@ -130,6 +120,10 @@ std::optional<ClaimedJob> Store::next_job() {
                   "UPDATE jobs SET status='running', message='', started=?, updated=?, attempts=attempts+1, "
                   "version=version+1 WHERE id=?",
                   at, at, id)
+            .run();
+        Statement(database,
+                  "UPDATE checkpoints SET last_used=? WHERE runs_hash=(SELECT runs_hash FROM jobs WHERE id=?)",
+                  at, id)
             .run();
         return ClaimedJob{*find_job(database, id), oldest.text(1)};
     });
@@ -207,15 +201,16 @@ Dismissal Store::dismiss(const std::string& id) {
                   "UPDATE jobs SET status='dismissed', finished=?, updated=?, version=version+1 WHERE id=?",
                   at, at, id)
             .run();
-        drop_unneeded_checkpoints(database, job->job_hash);
         return Dismissal::dismissed;
     });
 }
 
-void Store::save_checkpoint(const std::string& job_hash, const std::string& key, const StoredObject& object) {
+void Store::save_checkpoint(const std::string& job_hash, const std::string& runs_hash, const std::string& key,
+                            const StoredObject& object) {
+    const int64_t at = now();
     writer_.run([&](Database& database) {
-        Statement(database, "INSERT OR REPLACE INTO checkpoints VALUES(?,?,?,?)", job_hash, key,
-                  object.sha256, object.bytes)
+        Statement(database, "INSERT OR REPLACE INTO checkpoints VALUES(?,?,?,?,?)", runs_hash, key,
+                  object.sha256, object.bytes, at)
             .run();
         // Who gets on is not what ends the process: only attempts without a new checkpoint count.
         Statement(database, "UPDATE jobs SET attempts=1 WHERE job_hash=? AND status='running' AND attempts>1",

@@ -58,11 +58,4 @@ std::optional<StoredJob> find_job(Database& database, const std::string& id) {
     return row.step() ? std::optional(read_job(row)) : std::nullopt;
 }
 
-bool has_unfinished_job(Database& database, const std::string& job_hash) {
-    Statement row(database,
-                  "SELECT 1 FROM jobs WHERE job_hash=? AND status IN ('accepted', 'running') LIMIT 1",
-                  job_hash);
-    return row.step();
-}
-
 }  // namespace gonio

@@ -13,6 +13,5 @@ std::string select_jobs(const std::string& rest);
 StoredJob read_job(const Statement& row);
 
 std::optional<StoredJob> find_job(Database& database, const std::string& id);
-bool has_unfinished_job(Database& database, const std::string& job_hash);
 
 }  // namespace gonio

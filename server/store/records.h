@@ -22,6 +22,7 @@ struct NewJob {
     std::string process;                         // "brdf"
     std::string document;                        // the canonical job, as accepted
     std::string job_hash;                        // equal hash: equal result, computed once
+    std::string runs_hash;                       // under which its checkpoints are; jobs may share them
     std::string owner;                           // name of the token; may be empty
     std::optional<std::string> idempotency_key;  // unique per owner
     std::string request_hash;                    // of the request that came with the key
@@ -105,7 +106,8 @@ struct StoreCounts {
 };
 
 struct GcReport {
-    int64_t bytes_before = 0, bytes_after = 0;  // of surfaces and results, equal objects counted once
+    int64_t bytes_before = 0, bytes_after = 0;  // of all that is kept, equal objects counted once
+    int64_t checkpointed = 0;                   // computations whose checkpoints were removed
     int64_t results = 0, surfaces = 0;          // removed
     int64_t objects = 0;                        // files removed
 };

@@ -73,6 +73,20 @@ CREATE TABLE checkpoints(
 CREATE INDEX checkpoints_sha256 ON checkpoints(sha256);
 )sql",
     "ALTER TABLE jobs ADD COLUMN relative_error_ppb INTEGER",
+    // Checkpoints outlive their job, for others that can use them. Those of before are computed again.
+    R"sql(
+DROP TABLE checkpoints;
+CREATE TABLE checkpoints(
+    runs_hash TEXT NOT NULL,
+    key TEXT NOT NULL,
+    sha256 TEXT NOT NULL,
+    bytes INTEGER NOT NULL,
+    last_used INTEGER NOT NULL,
+    PRIMARY KEY(runs_hash, key)
+) STRICT, WITHOUT ROWID;
+CREATE INDEX checkpoints_sha256 ON checkpoints(sha256);
+ALTER TABLE jobs ADD COLUMN runs_hash TEXT NOT NULL DEFAULT '';
+)sql",
 };
 
 int64_t version_of(Database& database) {

@@ -107,19 +107,19 @@ std::vector<ResultOutput> Store::results(const std::string& job_hash) {
     });
 }
 
-std::optional<Checkpoint> Store::load_checkpoint(const std::string& job_hash, const std::string& key) {
+std::optional<Checkpoint> Store::load_checkpoint(const std::string& runs_hash, const std::string& key) {
     return readers_.read([&](Database& database) -> std::optional<Checkpoint> {
-        Statement row(database, "SELECT sha256, bytes FROM checkpoints WHERE job_hash=? AND key=?", job_hash,
+        Statement row(database, "SELECT sha256, bytes FROM checkpoints WHERE runs_hash=? AND key=?", runs_hash,
                       key);
         if (!row.step()) return {};
         return Checkpoint{key, row.text(0), row.integer(1)};
     });
 }
 
-std::vector<Checkpoint> Store::checkpoints(const std::string& job_hash) {
+std::vector<Checkpoint> Store::checkpoints(const std::string& runs_hash) {
     return readers_.read([&](Database& database) {
-        Statement rows(database, "SELECT key, sha256, bytes FROM checkpoints WHERE job_hash=? ORDER BY key",
-                       job_hash);
+        Statement rows(database, "SELECT key, sha256, bytes FROM checkpoints WHERE runs_hash=? ORDER BY key",
+                       runs_hash);
         std::vector<Checkpoint> found;
         while (rows.step()) found.push_back({rows.text(0), rows.text(1), rows.integer(2)});
         return found;

@@ -58,7 +58,7 @@ class Store {
     void progress(const std::string& job_hash, int percent, const std::string& message,
                   int64_t relative_error_ppb = 0);
     bool stop_requested(const std::string& job_hash);
-    // Replaces all checkpoints of the hash and ends all its jobs.
+    // Ends all jobs of the hash.
     void succeed(const std::string& job_hash, const std::vector<NewOutput>& outputs);
     void fail(const std::string& job_hash, const std::string& message, const std::string& problem);
     // The engine has stopped because it was asked to.
@@ -66,10 +66,12 @@ class Store {
     // Back into the queue, without counting the attempt: an orderly shutdown.
     void release(const std::string& job_hash);
 
-    // Parts of a running computation, found again after a crash. An equal key is replaced.
-    void save_checkpoint(const std::string& job_hash, const std::string& key, const StoredObject& object);
-    std::optional<Checkpoint> load_checkpoint(const std::string& job_hash, const std::string& key);
-    std::vector<Checkpoint> checkpoints(const std::string& job_hash);
+    // Parts of a computation, found again after a crash and by later jobs of the same runs_hash. They stay until
+    // gc needs their room. An equal key is replaced.
+    void save_checkpoint(const std::string& job_hash, const std::string& runs_hash, const std::string& key,
+                         const StoredObject& object);
+    std::optional<Checkpoint> load_checkpoint(const std::string& runs_hash, const std::string& key);
+    std::vector<Checkpoint> checkpoints(const std::string& runs_hash);
 
     // ---- objects and surfaces
 

@@ -30,54 +30,54 @@ bool is_referenced(Database& database, const std::string& sha256) {
 int64_t kept_bytes(Database& database) {
     Statement row(
         database,
-        "SELECT coalesce(sum(bytes), 0) FROM (SELECT sha256, bytes FROM surfaces UNION SELECT sha256, bytes "
-        "FROM results)");
+        "SELECT coalesce(sum(bytes), 0) FROM (" + std::string(referenced) + ")");
     row.step();
     return row.integer(0);
 }
 
+enum class Kind { checkpoints, result, surface };
+
 struct Evictable {
-    bool is_result;
-    std::string key;  // job_hash or sha256
+    Kind kind;
+    std::string key;  // runs_hash, job_hash or sha256
 };
 
+// Checkpoints before anything else: they only save time.
 std::vector<Evictable> least_recently_used(Database& database) {
     Statement rows(
         database,
-        "SELECT 1, job_hash, max(last_used) AS used FROM results AS r WHERE NOT EXISTS(SELECT 1 FROM jobs "
+        "SELECT kind, key FROM (SELECT 0 AS kind, runs_hash AS key, max(last_used) AS used FROM checkpoints AS c WHERE NOT EXISTS(SELECT 1 "
+        "FROM jobs WHERE runs_hash=c.runs_hash AND status IN ('accepted', 'running')) GROUP BY runs_hash "
+        "UNION ALL SELECT 1, job_hash, max(last_used) FROM results AS r WHERE NOT EXISTS(SELECT 1 FROM jobs "
         "WHERE job_hash=r.job_hash AND status IN ('accepted', 'running')) GROUP BY job_hash "
-        "UNION ALL SELECT 0, sha256, last_used FROM surfaces AS s WHERE NOT EXISTS(SELECT 1 FROM "
+        "UNION ALL SELECT 2, sha256, last_used FROM surfaces AS s WHERE NOT EXISTS(SELECT 1 FROM "
         "job_surfaces JOIN jobs ON sequence=job WHERE sha256=s.sha256 AND status IN ('accepted', "
-        "'running')) ORDER BY used");
+        "'running'))) ORDER BY min(kind, 1), used");
     std::vector<Evictable> list;
-    while (rows.step()) list.push_back({rows.integer(0) != 0, rows.text(1)});
+    while (rows.step()) list.push_back({static_cast<Kind>(rows.integer(0)), rows.text(1)});
     return list;
 }
 
-// Bytes that no surface and no result points to any more.
+// Bytes to which nothing points any more.
 int64_t evict(Database& database, const Evictable& victim, int64_t at) {
-    const std::string table = victim.is_result ? "results WHERE job_hash=?" : "surfaces WHERE sha256=?";
+    const std::string table = victim.kind == Kind::checkpoints ? "checkpoints WHERE runs_hash=?"
+                              : victim.kind == Kind::result    ? "results WHERE job_hash=?"
+                                                               : "surfaces WHERE sha256=?";
     std::unordered_map<std::string, int64_t> objects;
     {
         Statement rows(database, "SELECT sha256, bytes FROM " + table, victim.key);
         while (rows.step()) objects[rows.text(0)] = rows.integer(1);
     }
     Statement(database, "DELETE FROM " + table, victim.key).run();
-    if (victim.is_result)
+    if (victim.kind == Kind::result)
         Statement(database,
                   "UPDATE jobs SET expires=?, updated=?, version=version+1 "
                   "WHERE job_hash=? AND status='successful' AND expires IS NULL",
                   at, at, victim.key)
             .run();
     int64_t freed = 0;
-    for (const auto& [sha256, bytes] : objects) {
-        Statement still(
-            database,
-            "SELECT 1 WHERE EXISTS(SELECT 1 FROM surfaces WHERE sha256=?1) OR EXISTS(SELECT 1 FROM results "
-            "WHERE sha256=?1)",
-            sha256);
-        if (!still.step()) freed += bytes;
-    }
+    for (const auto& [sha256, bytes] : objects)
+        if (!is_referenced(database, sha256)) freed += bytes;
     return freed;
 }
 
@@ -88,7 +88,9 @@ GcReport evict_beyond(Database& database, int64_t quota, int64_t at) {
     for (const Evictable& victim : least_recently_used(database)) {
         if (report.bytes_after <= quota) break;
         report.bytes_after -= evict(database, victim, at);
-        ++(victim.is_result ? report.results : report.surfaces);
+        ++(victim.kind == Kind::checkpoints ? report.checkpointed
+           : victim.kind == Kind::result    ? report.results
+                                            : report.surfaces);
     }
     return report;
 }

@@ -47,16 +47,16 @@ Table shard_by_shard(const Measure& measure, int* n_shards) {
         try {
             return measure(options).table;
         } catch (const MissingShards& missing) {
-            EXPECT_FALSE(missing.indices().empty());
+            EXPECT_FALSE(missing.shards().empty());
             // Backwards, on other numbers of threads, the first one twice.
-            std::vector<int> order(missing.indices().rbegin(), missing.indices().rend());
+            std::vector<Shard> order(missing.shards().rbegin(), missing.shards().rend());
             order.push_back(order.back());
-            for (const int index : order) {
+            for (const auto& [index, key] : order) {
                 options.n_threads = 1 + index % 2;
                 options.shard_task = {ShardTask::Kind::compute_one, index};
                 EXPECT_THROW(measure(options), ShardDone) << index;
             }
-            *n_shards += static_cast<int>(missing.indices().size());
+            *n_shards += static_cast<int>(missing.shards().size());
         }
     }
 }
@@ -147,7 +147,8 @@ TEST(Shards, ALaterShardAsksForThoseBeforeIt) {
         measure_brdf(c.surface, c.material, c.plan, options);
         FAIL();
     } catch (const MissingShards& missing) {
-        EXPECT_EQ(missing.indices(), (std::vector<int>{0, 1, 2, 3, 4, 5}));
+        ASSERT_EQ(missing.shards().size(), 6u);
+        for (int k = 0; k < 6; ++k) EXPECT_EQ(missing.shards()[k].index, k);
     }
     EXPECT_EQ(memory.saved, 0);
 }
@@ -164,14 +165,38 @@ TEST(Shards, BlocksDoNotDependOnThreads) {
     expect_same_bits(one, measure_brdf(surface, gray({0.7}), plan, options).table);
 }
 
+// A job takes over what it has in common with one of another target.
+TEST(Shards, AFinerTargetTakesTheRunsThatAreThere) {
+    Case c = cases()[3];
+    auto measured = [&](double target, Memory& memory) {
+        c.plan.accuracy.target_relative_error = target;
+        RunOptions options;
+        options.checkpoints = &memory;
+        return measure_brdf(c.surface, c.material, c.plan, options);
+    };
+    Memory shared, alone;
+    measured(0.02, shared);  // other settings: nothing in common
+    measured(0.005, shared);
+    const int coarse = shared.saved;
+    const BrdfResult finer = measured(0.003, shared);
+    expect_same_bits(finer.table, measured(0.003, alone).table);
+    const int computed = shared.saved - coarse;
+    EXPECT_GT(computed, 0);
+    EXPECT_GE(alone.saved - computed, 6) << "of " << alone.saved << " parts";
+    EXPECT_EQ(finer.report.skipped.back().second,
+              "a checkpoint had them, of this job or of one with another target");
+}
+
 TEST(Shards, ForeignBytesAreRefused) {
     const Case c = cases()[4];
     Memory memory;
     RunOptions options;
     options.checkpoints = &memory;
     for (const std::string& bytes : {std::string(), std::string("x"), std::string(4096, '\xff')}) {
-        memory.parts["shard-0"] = bytes;
+        measure_brdf(c.surface, c.material, c.plan, options);
+        memory.parts.begin()->second = bytes;
         EXPECT_THROW(measure_brdf(c.surface, c.material, c.plan, options), Error);
+        memory.parts.clear();
     }
 }
 

@@ -60,6 +60,17 @@ class Api(Service):
         self.assertEqual((again["status"], again["job_hash"]), ("successful", first["job_hash"]))
         self.assertNotEqual(again["jobID"], first["jobID"])
 
+    def test_finer_target_takes_the_runs_that_are_there(self):
+        surface = {"generate": "gaussian", "samples": 512, "pitch": "1 um", "correlation_length": "4 um", "rms_slope": 0.7}
+        coarse, fine = ({**JOB, "surface": surface, "accuracy": {"target_relative_error": target}} for target in (0.005, 0.003))
+        self.assertEqual(self.submit(coarse, Prefer="wait=30")["status"], "successful")
+        self.restart()
+        job = self.submit(fine, Prefer="wait=30")
+        self.assertEqual(job["status"], "successful")
+        report = self.call("GET", f"/jobs/{job['jobID']}/results/report")[1]
+        self.assertIn("6 runs", str(report), "those of the first job")
+        self.assertEqual(self.table(job["jobID"]), self.local(fine))
+
     def test_idempotency_key(self):
         first = self.submit(JOB, Idempotency_Key="a")
         self.assertEqual(self.submit(JOB, Idempotency_Key="a")["jobID"], first["jobID"])

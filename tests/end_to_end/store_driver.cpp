@@ -37,7 +37,7 @@ NewJob job_number(int64_t n) {
     NewJob job;
     job.process = "brdf";
     job.document = "{\"number\":" + std::to_string(n / 2) + ",\"text\":\"" + std::string(2000, 'x') + "\"}";
-    job.job_hash = sha256_hex(job.document);
+    job.job_hash = job.runs_hash = sha256_hex(job.document);
     job.owner = n % 3 ? "anna" : "";
     job.idempotency_key = "key-" + std::to_string(n);
     job.request_hash = sha256_hex("request " + std::to_string(n));
@@ -66,7 +66,7 @@ void compute(Store& store, const std::string& job_hash) {
     for (int part = 0; part < parts; ++part) {
         const std::string key = "part " + std::to_string(part);
         if (!store.load_checkpoint(job_hash, key))
-            store.save_checkpoint(job_hash, key, store.objects().put(pseudo_part(job_hash, part)));
+            store.save_checkpoint(job_hash, job_hash, key, store.objects().put(pseudo_part(job_hash, part)));
         whole += read_object(store, store.load_checkpoint(job_hash, key)->sha256);
         store.progress(job_hash, 100 * (part + 1) / parts, key);
     }

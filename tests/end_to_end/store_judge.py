@@ -71,7 +71,7 @@ def judge(folder, acknowledged, done):
             faults.append(f"integrity: {answer}")
         jobs = rows(folder, "SELECT owner, idempotency_key, id FROM jobs")
         results = rows(folder, "SELECT job_hash, name, sha256, bytes FROM results")
-        parts = rows(folder, "SELECT job_hash, key, sha256, bytes FROM checkpoints")
+        parts = rows(folder, "SELECT runs_hash, key, sha256, bytes FROM checkpoints")
         unfounded = rows(folder, "SELECT id FROM jobs WHERE status='successful' AND job_hash NOT IN (SELECT job_hash FROM results)")
     except sqlite3.Error as error:
         return [f"database: {error}"]

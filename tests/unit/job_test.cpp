@@ -370,6 +370,16 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
     EXPECT_EQ(std::unique(hashes.begin(), hashes.end()), hashes.end());
 }
 
+TEST(JobHash, OfItsRunsLeavesOutWhenToStop) {
+    const auto runs_of = [](const json& merge) { return load_job(parse(base_document(merge))).runs_hash; };
+    const std::string runs = runs_of(json::object());
+    EXPECT_EQ(runs_of({{"accuracy", {{"target_relative_error", 0.002}}}}), runs);
+    EXPECT_EQ(runs_of({{"accuracy", {{"max_seconds", 3}}}}), runs);
+    EXPECT_NE(runs_of({{"accuracy", {{"seed", 2}}}}), runs);
+    EXPECT_NE(runs_of({{"measure", {{"max_order", 2}}}}), runs);
+    EXPECT_NE(runs, hash_of(base_document()));
+}
+
 TEST(JobHash, NamesTheProgramThatComputes) {
     const LoadedJob loaded = load_job(parse(base_document()));
     const json canonical = json::parse(canonical_job(loaded.surface.hash, loaded.material, loaded.job.plan));
@@ -536,8 +546,7 @@ TEST(Outputs, GoBelowTheFolder) {
                                             {{"format", "json"}, {"path", "/c.json"}}}}})),
                      {},
                      {},
-                     std::nullopt,
-                     ""};
+                     std::nullopt};
     EXPECT_EQ(output_files(loaded, "results")[0].path, "results/a/b.csv");
     EXPECT_EQ(output_files(loaded, ".")[0].path, "a/b.csv");
     EXPECT_EQ(output_files(loaded, "results")[1].path, "/c.json");

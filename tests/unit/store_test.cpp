@@ -53,11 +53,16 @@ class StoreTest : public testing::Test {
         options.now = [this] { return time.load(); };
         store = std::make_unique<Store>(options);
     }
+    static std::string runs_of(const std::string& hash) { return "runs of " + hash; }
+    void save_part(const std::string& hash, const std::string& key, const std::string& bytes) {
+        store->save_checkpoint(hash, runs_of(hash), key, store->objects().put(bytes));
+    }
     static NewJob job(const std::string& hash, const std::string& owner = "anna") {
         NewJob job;
         job.process = "brdf";
         job.document = "{\"of\":\"" + hash + "\"}";
         job.job_hash = hash;
+        job.runs_hash = runs_of(hash);
         job.owner = owner;
         job.request_hash = "request " + hash;
         return job;
@@ -290,7 +295,7 @@ TEST_F(StoreTest, DismissingEndsWhatNobodyElseWants) {
 
     const std::string running = accept("r");
     claim();
-    store->save_checkpoint("r", "part", store->objects().put("part"));
+    save_part("r", "part", "part");
     EXPECT_FALSE(store->stop_requested("r"));
     EXPECT_EQ(store->dismiss(running), Dismissal::stopping);
     EXPECT_EQ(store->dismiss(running), Dismissal::stopping);
@@ -298,18 +303,17 @@ TEST_F(StoreTest, DismissingEndsWhatNobodyElseWants) {
     EXPECT_EQ(status(running), JobStatus::running);
     store->stopped("r");
     EXPECT_EQ(status(running), JobStatus::dismissed);
-    EXPECT_TRUE(store->checkpoints("r").empty());
 }
 
 TEST_F(StoreTest, AnEqualJobTakesADismissedComputationOver) {
     const std::string leader = accept("h"), heir = accept("h");
     claim();
-    store->save_checkpoint("h", "part", store->objects().put("part"));
+    save_part("h", "part", "part");
     EXPECT_EQ(store->dismiss(leader), Dismissal::dismissed);
     EXPECT_EQ(status(leader), JobStatus::dismissed);
     EXPECT_EQ(status(heir), JobStatus::running);
     EXPECT_FALSE(store->stop_requested("h"));
-    EXPECT_EQ(store->checkpoints("h").size(), 1u);
+    EXPECT_EQ(store->checkpoints(runs_of("h")).size(), 1u);
     EXPECT_EQ(claim(), "");
     succeed("h");
     EXPECT_EQ(status(heir), JobStatus::successful);
@@ -326,22 +330,45 @@ TEST_F(StoreTest, AComputationThatEndsAfterItsDismissalStaysDismissed) {
     EXPECT_EQ(status(later), JobStatus::successful);
 }
 
-TEST_F(StoreTest, CheckpointsLiveUntilTheResult) {
+TEST_F(StoreTest, CheckpointsAreFoundAgain) {
     const std::string id = accept("h");
     claim();
-    store->save_checkpoint("h", "2", store->objects().put("old"));
-    store->save_checkpoint("h", "2", store->objects().put("second"));
-    store->save_checkpoint("h", "1", store->objects().put("first"));
+    save_part("h", "2", "old");
+    save_part("h", "2", "second");
+    save_part("h", "1", "first");
     open();
     EXPECT_EQ(status(id), JobStatus::accepted);
-    ASSERT_EQ(store->checkpoints("h").size(), 2u);
-    EXPECT_EQ(store->checkpoints("h")[0].key, "1");
-    EXPECT_EQ(store->load_checkpoint("h", "2")->sha256, sha256_hex("second"));
-    EXPECT_FALSE(store->load_checkpoint("h", "3"));
+    ASSERT_EQ(store->checkpoints(runs_of("h")).size(), 2u);
+    EXPECT_EQ(store->checkpoints(runs_of("h"))[0].key, "1");
+    EXPECT_EQ(store->load_checkpoint(runs_of("h"), "2")->sha256, sha256_hex("second"));
+    EXPECT_FALSE(store->load_checkpoint(runs_of("h"), "3"));
     EXPECT_EQ(store->gc(0).objects, 1) << "the replaced part, and not those of an unfinished job";
-    claim();
-    succeed("h");
-    EXPECT_TRUE(store->checkpoints("h").empty());
+}
+
+// Longer than their job, for a finer one; but they are the first to go, and not while such a job waits.
+TEST_F(StoreTest, CheckpointsAreTheFirstToGo) {
+    for (const char* hash : {"a", "b"}) {
+        accept(hash);
+        claim();
+        time += 10;
+        save_part(hash, "1", std::string(1000, hash[0]));
+        succeed(hash, std::string("table of ") + hash);
+    }
+    EXPECT_EQ(store->gc(3000).bytes_after, 2020);
+    NewJob finer = job("finer");
+    finer.runs_hash = runs_of("a");
+    const std::string id = store->accept(finer).job.id;
+    GcReport report = store->gc(1500);
+    EXPECT_EQ(report.checkpointed, 1);
+    EXPECT_EQ(report.results, 0);
+    EXPECT_EQ(store->checkpoints(runs_of("a")).size(), 1u);
+    EXPECT_TRUE(store->checkpoints(runs_of("b")).empty());
+    EXPECT_EQ(store->dismiss(id), Dismissal::dismissed);
+    report = store->gc(20);
+    EXPECT_EQ(report.checkpointed, 1);
+    EXPECT_EQ(report.bytes_after, 20);
+    EXPECT_EQ(report.results, 0);
+    EXPECT_TRUE(store->check(true).faults.empty());
 }
 
 TEST_F(StoreTest, AJobThatKillsTheServiceIsGivenUp) {
@@ -513,7 +540,7 @@ TEST_F(StoreTest, RemovingAndWritingAtOnceLosesNothing) {
         while (!done) store->gc(int64_t{1} << 40);
     });
     for (int k = 0; k < 200; ++k)
-        store->save_checkpoint("h", "key", store->objects().put(std::to_string(k % 3)));
+        save_part("h", "key", std::to_string(k % 3));
     done = true;
     collector.join();
     EXPECT_TRUE(store->check(true).faults.empty());
