@@ -1,7 +1,6 @@
 #include "server/service/api.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include "server/service/openapi.h"
 #include "server/service/page.h"
@@ -17,7 +16,6 @@ using nlohmann::ordered_json;
 
 constexpr const char* conformance[] = {"core",   "ogc-process-description", "json", "oas30", "job-list",
                                        "dismiss"};
-constexpr uintmax_t least_free_bytes = 256 << 20;
 
 ordered_json landing() {
     return {{"title", "gonio"},
@@ -46,12 +44,7 @@ Response process_list(const Request& request) {
 
 std::string why_not_ready(Store& store, const http::GuardedServer& server) {
     if (server.draining()) return "the service is about to end";
-    std::error_code failure;
-    const auto space = std::filesystem::space(store.folder(), failure);
-    if (failure) return "the data folder cannot be read";
-    if (space.available < least_free_bytes)
-        return "less than 256 MiB are free on the disk of the data folder";
-    return "";
+    return store.no_room();
 }
 
 void add_health(http::GuardedServer& to, Store& store, const http::GuardedServer& server) {

@@ -15,6 +15,13 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto between_upkeeps = 10min;
+// To a disk that is full, or failed.
+constexpr auto between_looks = 500ms, before_next_attempt = 1000ms;
+
+// A file of ours that could not be read or written. (The errors of executors name no file.)
+bool is_of_the_disk(const Error& error) {
+    return error.code() == ErrorCode::io && error.field().starts_with('/');
+}
 
 double seconds_since(Clock::time_point start) {
     return std::chrono::duration<double>(Clock::now() - start).count();
@@ -70,17 +77,27 @@ Engine::~Engine() {
 void Engine::work() {
     uint64_t seen = store_.changes();
     while (!ending_) {
-        try {
-            const std::optional<ClaimedJob> claimed = store_.next_job();
-            if (claimed) {
-                compute(*claimed);
-                continue;
-            }
-        } catch (const std::exception&) {  // the disk: the job stays where it is, and is tried again
-            std::this_thread::sleep_for(500ms);
-        }
-        seen = store_.wait_for_change(seen, 500ms);
+        std::optional<ClaimedJob> claimed;
+        // What was accepted waits for room.
+        if (store_.no_room().empty()) claimed = insist([&] { return store_.next_job(); });
+        if (claimed)
+            compute(*claimed);
+        else
+            seen = store_.wait_for_change(seen, between_looks);
     }
+}
+
+// The store's word, once the disk takes it.
+template <class Ask>
+auto Engine::insist(Ask&& ask) -> decltype(ask()) {
+    while (!ending_) {
+        try {
+            return ask();
+        } catch (const std::exception&) {
+            std::this_thread::sleep_for(between_looks);
+        }
+    }
+    return {};  // what is said nowhere else is said at the next start
 }
 
 // A running job that is dismissed must end within a second, one that is out of time at once. And what is
@@ -141,7 +158,8 @@ void Engine::compute(const ClaimedJob& claimed) {
         const std::lock_guard lock(current_mutex_);
         current_hash_.clear();
     }
-    const std::string status = failure ? end_with(claimed, *failure, out_of_time_) : "successful";
+    const std::string status =
+        failure ? insist([&] { return end_with(claimed, *failure, out_of_time_); }) : "successful";
     const double seconds = seconds_since(began);
     times_.record(seconds);
     if (options_.on_end) options_.on_end(claimed.job.process, status, seconds);
@@ -153,6 +171,10 @@ std::string Engine::end_with(const ClaimedJob& claimed, const Error& failure, bo
         store_.fail(hash, error.what(), failure_json(error, {-1, ""}));
         return "failed";
     };
+    if (is_of_the_disk(failure) && store_.try_again(hash)) {
+        std::this_thread::sleep_for(before_next_attempt);
+        return "released";
+    }
     if (failure.code() != ErrorCode::cancelled) return failed(failure);
     if (store_.stop_requested(hash)) {
         store_.stopped(hash);

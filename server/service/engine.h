@@ -36,6 +36,8 @@ class Engine {
     void work();
     void watch();
     void compute(const ClaimedJob& claimed);
+    template <class Ask>
+    auto insist(Ask&& ask) -> decltype(ask());
     std::string end_with(const ClaimedJob& claimed, const Error& failure, bool out_of_time);
 
     Store& store_;

@@ -57,6 +57,15 @@ std::string problem_of_deaths(int attempts) {
            " attempts to compute this job ended with the death of the process; it is not tried again\"}";
 }
 
+void put_back(Database& database, const std::string& job_hash, int attempts_spared, int64_t at) {
+    dismiss_stopped(database, job_hash, at);
+    Statement(database,
+              "UPDATE jobs SET status='accepted', started=NULL, attempts=attempts-?, updated=?, "
+              "version=version+1 WHERE job_hash=? AND status='running'",
+              attempts_spared, at, job_hash)
+        .run();
+}
+
 // The oldest equal job goes on with the computation of a dismissed one; false if there is none.
 bool hand_over(Database& database, const StoredJob& from, int64_t at) {
     Statement(database,
@@ -171,12 +180,18 @@ void Store::stopped(const std::string& job_hash) {
 void Store::release(const std::string& job_hash) {
     const int64_t at = now();
     writer_.run([&](Database& database) {
-        dismiss_stopped(database, job_hash, at);
-        Statement(database,
-                  "UPDATE jobs SET status='accepted', started=NULL, attempts=attempts-1, updated=?, "
-                  "version=version+1 WHERE job_hash=? AND status='running'",
-                  at, job_hash)
-            .run();
+        put_back(database, job_hash, 1, at);
+        return true;
+    });
+}
+
+bool Store::try_again(const std::string& job_hash) {
+    const int64_t at = now();
+    return writer_.run([&](Database& database) {
+        Statement last(database, "SELECT 1 FROM jobs WHERE job_hash=? AND status='running' AND attempts>=?",
+                       job_hash, max_attempts_);
+        if (last.step()) return false;
+        put_back(database, job_hash, 0, at);
         return true;
     });
 }
@@ -232,7 +247,7 @@ void Store::put_surface(const StoredObject& object) {
     });
 }
 
-void Store::recover(int max_attempts) {
+void Store::recover() {
     const int64_t at = now();
     writer_.run([&](Database& database) {
         std::vector<StoredJob> interrupted;
@@ -243,7 +258,7 @@ void Store::recover(int max_attempts) {
         for (const StoredJob& job : interrupted) {
             if (job.stop_requested) {
                 dismiss_stopped(database, job.job_hash, at);
-            } else if (job.attempts >= max_attempts) {
+            } else if (job.attempts >= max_attempts_) {
                 // With its equals: they would end the process as it did.
                 end_jobs(database, job.job_hash, JobStatus::failed, "its computation ended the service",
                          problem_of_deaths(job.attempts), at);

@@ -17,6 +17,8 @@ int64_t system_now() {
         .count();
 }
 
+constexpr uintmax_t least_free_bytes = 256 << 20;
+
 std::string prepared(const std::string& folder) {
     if (folder.empty()) throw Error(ErrorCode::io, "folder", "", "is empty");
     const std::string absolute = std::filesystem::absolute(folder).lexically_normal().string();
@@ -28,6 +30,7 @@ std::string prepared(const std::string& folder) {
 
 Store::Store(const StoreOptions& options)
     : now_(options.now ? options.now : system_now),
+      max_attempts_(options.max_attempts),
       folder_(prepared(options.folder)),
       lock_(folder_),
       objects_(folder_),
@@ -39,10 +42,19 @@ Store::Store(const StoreOptions& options)
                                          changed_.notify_all();
                                      }}) {
     sync_folder_or_die(folder_);  // the database's own name
-    recover(options.max_attempts);
+    recover();
 }
 
 Store::~Store() = default;
+
+std::string Store::no_room() const {
+    std::error_code failure;
+    const auto space = std::filesystem::space(folder_, failure);
+    if (failure) return "the data folder cannot be read";
+    if (space.available < least_free_bytes)
+        return "less than 256 MiB are free on the disk of the data folder";
+    return "";
+}
 
 std::optional<StoredJob> Store::find(const std::string& id) {
     return readers_.read([&](Database& database) { return find_job(database, id); });

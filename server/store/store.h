@@ -16,7 +16,8 @@ namespace gonio {
 struct StoreOptions {
     std::string folder;                 // made if missing; on a local disk (SQLite's log needs shared memory)
     std::function<int64_t()> now = {};  // ms since the epoch; empty: the system's clock
-    int max_attempts = 20;  // computations of a job that may end with the process, without a new checkpoint
+    // Computations of a job that may end with the process or an error of the disk, without a new checkpoint.
+    int max_attempts = 20;
 };
 
 // Any thread may call anything. Errors of the disk are Error(io) naming the folder or the file; the store
@@ -65,6 +66,9 @@ class Store {
     void stopped(const std::string& job_hash);
     // Back into the queue, without counting the attempt: an orderly shutdown.
     void release(const std::string& job_hash);
+    // Back into the queue after an error of the disk; the attempt counts. False, and nothing done, if it was
+    // the last one.
+    bool try_again(const std::string& job_hash);
 
     // Parts of a computation, found again after a crash and by later jobs of the same runs_hash. They stay until
     // gc needs their room. An equal key is replaced.
@@ -76,6 +80,8 @@ class Store {
     // ---- objects and surfaces
 
     const std::string& folder() const { return folder_; }
+    // Why the disk takes nothing more, as long as that is so; empty otherwise.
+    std::string no_room() const;
     Objects& objects() { return objects_; }
     void put_surface(const StoredObject& object);
     bool has_surface(const std::string& sha256);
@@ -105,10 +111,11 @@ class Store {
         std::set<std::string> surfaces, results;
     };
     int64_t now() const { return now_(); }
-    void recover(int max_attempts);
+    void recover();
     void write_pending(Database& database);
 
     std::function<int64_t()> now_;
+    int max_attempts_;
     std::string folder_;
     FolderLock lock_;
     Objects objects_;

@@ -1,6 +1,7 @@
 """A `gonio serve` on a port of this machine, for the tests that start, ask and kill one."""
 import http.client
 import json
+import os
 import pathlib
 import re
 import subprocess
@@ -10,10 +11,11 @@ class Daemon:
     def __init__(self, gonio, data):
         self.gonio, self.data, self.port, self.process = gonio, pathlib.Path(data), 0, None
 
-    def start(self, *options, port=0):
-        """On any port, or on one that clients know already."""
+    def start(self, *options, port=0, env=None, stderr=None):
+        """On any port, or on one that clients know already; `env` is added to ours, `stderr` a file."""
         self.process = subprocess.Popen([self.gonio, "serve", "--data", str(self.data), "--listen", f"127.0.0.1:{port}",
-                                         "--threads", "1", *options], stdout=subprocess.PIPE, text=True)
+                                         "--threads", "1", *options], stdout=subprocess.PIPE, stderr=stderr, text=True,
+                                        env={**os.environ, **(env or {})})
         line = self.process.stdout.readline()
         match = re.fullmatch(r"listening on http://127\.0\.0\.1:(\d+)\n", line)
         if not match:

@@ -371,6 +371,24 @@ TEST_F(StoreTest, CheckpointsAreTheFirstToGo) {
     EXPECT_TRUE(store->check(true).faults.empty());
 }
 
+TEST_F(StoreTest, AnErrorOfTheDiskIsTriedAgain) {
+    const std::string id = accept("h");
+    for (int attempt = 1; attempt < 20; ++attempt) {
+        EXPECT_EQ(claim(), id);
+        EXPECT_TRUE(store->try_again("h")) << attempt;
+        EXPECT_EQ(status(id), JobStatus::accepted);
+    }
+    EXPECT_EQ(claim(), id);
+    EXPECT_FALSE(store->try_again("h"));
+    EXPECT_EQ(status(id), JobStatus::running);
+    save_part("h", "1", "progress");
+    EXPECT_TRUE(store->try_again("h"));
+    EXPECT_EQ(claim(), id);
+    EXPECT_EQ(store->dismiss(id), Dismissal::stopping);
+    EXPECT_TRUE(store->try_again("h"));
+    EXPECT_EQ(status(id), JobStatus::dismissed);
+}
+
 TEST_F(StoreTest, AJobThatKillsTheServiceIsGivenUp) {
     const std::string id = accept("h"), equal = accept("h"), other = accept("o");
     for (int attempt = 1; attempt <= 20; ++attempt) {
