@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from service_fixture import GONIO, GROOVE, JOB, LAVA, LONG, MEDIUM, Service
+from service_fixture import GONIO, GROOVE, JOB, LAVA, LONG, MANY_RUNS, MEDIUM, Service
 
 
 class Api(Service):
@@ -124,7 +124,7 @@ class Api(Service):
 
     def test_events(self):
         # A stream may leave out what lasted less than half a second, so: a job that only ends when it is told to.
-        job = self.submit(LONG)["jobID"]
+        job = self.submit(MANY_RUNS)["jobID"]
         connection = http.client.HTTPConnection("127.0.0.1", self.daemon.port, timeout=120)
         self.addCleanup(connection.close)
         connection.request("GET", f"/jobs/{job}/events")
