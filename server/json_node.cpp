@@ -79,24 +79,24 @@ json parse_json_strictly(std::string_view text, const JsonLimits& limits) {
     }
     struct Open {  // an object or array whose end has not come
         bool is_array;
-        size_t elements = 0;             // so far
-        std::string key = {};            // the newest
+        size_t elements = 0;   // so far
+        std::string key = {};  // the newest
         std::set<std::string> keys = {};
     };
     std::vector<Open> open;
     const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-        using enum json::parse_event_t;
-        const bool starts = event == object_start || event == array_start;
-        if ((starts || event == value) && !open.empty()) ++open.back().elements;
+        using Event = json::parse_event_t;  // clang 14 has no "using enum" for an alias
+        const bool starts = event == Event::object_start || event == Event::array_start;
+        if ((starts || event == Event::value) && !open.empty()) ++open.back().elements;
         if (starts) {
             if (depth >= limits.max_depth) {
                 throw Error(ErrorCode::invalid_input, "", "",
                             "the document is nested deeper than " + std::to_string(limits.max_depth));
             }
-            open.push_back({event == array_start});
-        } else if (event == object_end || event == array_end) {
+            open.push_back({event == Event::array_start});
+        } else if (event == Event::object_end || event == Event::array_end) {
             open.pop_back();
-        } else if (event == key) {
+        } else if (event == Event::key) {
             open.back().key = pointer_token(parsed.get<std::string>());
             if (!open.back().keys.insert(open.back().key).second) {
                 std::string path;

@@ -106,7 +106,7 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
         options.executor = make_executor(serve.executor, serve.shards);
         options.shared_folder = serve.shared_folder.empty() ? serve.data + "/shards" : serve.shared_folder;
         options.shard_command = {std::filesystem::read_symlink("/proc/self/exe").string(),
-                                 serve.shards.threads};
+                                 serve.shards.threads, true};
     }
     options.on_end = [&](const std::string& process, const std::string& status, double seconds) {
         metrics.count_job(process, status, seconds);

@@ -7,6 +7,7 @@
 #include "clients/cli/commands.h"
 #include "clients/cli/console.h"
 #include "clients/cli/execute.h"
+#include "server/service/uploads.h"
 
 namespace gonio {
 namespace {
@@ -15,11 +16,14 @@ struct ShardedJob {
     std::string path;
     int index = 0;
     long long reference_paths = 0;  // > 0: by the path tracer
+    bool untrusted = false;
 
     LoadedJob load() const {
         std::optional<ReferenceOptions> reference;
         if (reference_paths > 0) reference = ReferenceOptions{reference_paths};
-        return load_job(read_job(path), reference);
+        Job job = read_job(path);
+        if (untrusted) read_as_untrusted(job);
+        return load_job(job, reference);
     }
 };
 
@@ -78,6 +82,8 @@ void add_shard(CLI::App& app, CommonOptions& common, Action& action) {
     command->add_option("--index", sharded->index, "Number of the shard")
         ->required()
         ->check(CLI::Range(0, 1 << 30));
+    command->add_flag("--untrusted", sharded->untrusted,
+                      "Its files are strangers': OpenEXR is decoded in a process that can do nothing else");
     add_common(*command, *sharded, common);
     command->callback(
         [sharded, &common, &action] { action = [sharded, &common] { return run_shard(*sharded, common); }; });

@@ -60,6 +60,7 @@ std::string script_of(const JobFolder& folder, const LoadedJob& job, const Shard
         shell_quoted(folder.shared()) + " --quiet --threads " + std::to_string(command.threads) +
         " --max-memory " + number_text(static_cast<double>(options.max_bytes) / 0x1p30);
     if (!options.allow_skips) shard += " --no-skip";
+    if (command.untrusted) shard += " --untrusted";
     if (job.reference) shard += " --reference " + std::to_string(job.reference->paths);
     return R"(#!/bin/sh
 # Computes one shard: run INDEX, or run LIST LINE for the number in that line of a list.

@@ -30,6 +30,7 @@ struct ShardFailure {
 struct ShardCommand {
     std::string program;  // gonio, as it is called there
     int threads = 1;
+    bool untrusted = false;  // its files are strangers': what may harm is decoded in a process of its own
 };
 
 class JobFolder {

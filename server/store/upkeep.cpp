@@ -28,9 +28,7 @@ bool is_referenced(Database& database, const std::string& sha256) {
 }
 
 int64_t kept_bytes(Database& database) {
-    Statement row(
-        database,
-        "SELECT coalesce(sum(bytes), 0) FROM (" + std::string(referenced) + ")");
+    Statement row(database, "SELECT coalesce(sum(bytes), 0) FROM (" + std::string(referenced) + ")");
     row.step();
     return row.integer(0);
 }
@@ -46,7 +44,8 @@ struct Evictable {
 std::vector<Evictable> least_recently_used(Database& database) {
     Statement rows(
         database,
-        "SELECT kind, key FROM (SELECT 0 AS kind, runs_hash AS key, max(last_used) AS used FROM checkpoints AS c WHERE NOT EXISTS(SELECT 1 "
+        "SELECT kind, key FROM (SELECT 0 AS kind, runs_hash AS key, max(last_used) AS used FROM checkpoints "
+        "AS c WHERE NOT EXISTS(SELECT 1 "
         "FROM jobs WHERE runs_hash=c.runs_hash AND status IN ('accepted', 'running')) GROUP BY runs_hash "
         "UNION ALL SELECT 1, job_hash, max(last_used) FROM results AS r WHERE NOT EXISTS(SELECT 1 FROM jobs "
         "WHERE job_hash=r.job_hash AND status IN ('accepted', 'running')) GROUP BY job_hash "
@@ -179,7 +178,7 @@ StoreCheck Store::check(bool deep) {
         const std::string fault = fault_of(objects_, sha256, bytes, deep);
         if (fault.empty()) continue;
         // Unless its row went too while we looked.
-        if (readers_.read([&](Database& database) { return is_referenced(database, sha256); }))
+        if (readers_.read([&, &name = sha256](Database& database) { return is_referenced(database, name); }))
             report.faults.push_back("object " + sha256 + ": " + fault);
     }
     objects_.for_each([&](const std::string& sha256, int64_t) {

@@ -57,13 +57,13 @@ TEST_F(JobFolderTest, AShardIsCalledAsTheJobWants) {
     RunOptions options;
     options.max_bytes = 3LL << 29;
     options.allow_skips = false;
-    const JobFolder job(root / "shared", loaded, small_job, ".", {program, 4}, options);
+    const JobFolder job(root / "shared", loaded, small_job, ".", {program, 4, true}, options);
     job.new_submission({11, 22});
     const std::string run = shell_quoted(job.script());
     ASSERT_EQ(run_command(run + " " + shell_quoted(job.list(1)) + " 2", seconds(60)).exit_code, 0);
     EXPECT_EQ(read(program + ".called"),
               job.dispatch() + "|shard|--job|job.json|--index|22|--checkpoints|" + job.shared() +
-                  "|--quiet|--threads|4|--max-memory|1.5|--no-skip|--reference|512|");
+                  "|--quiet|--threads|4|--max-memory|1.5|--no-skip|--untrusted|--reference|512|");
 }
 
 TEST_F(JobFolderTest, FailuresAreKeptWithWhatWasSaid) {
