@@ -5,7 +5,7 @@ Clients submit small jobs, each with an Idempotency-Key, while the daemon is kil
 on the same folder and port. Afterwards: every acknowledged job is there and successful, equal jobs have equal tables, a
 sample of them (and the long ones, which were killed in the middle) has the bytes of `gonio run`, no key made two jobs.
 
-Usage: daemon_kill_test.py GONIO SOURCE_FOLDER [--kills N] [--jobs N]
+Usage: daemon_kill_test.py GONIO SOURCE_FOLDER [--kills N] [--jobs N] [--patience SECONDS]
 """
 import argparse
 import hashlib
@@ -28,6 +28,7 @@ parser.add_argument("gonio")
 parser.add_argument("source")
 parser.add_argument("--kills", type=int, default=200)
 parser.add_argument("--jobs", type=int, default=2000)
+parser.add_argument("--patience", type=float, default=300, help="for the jobs to end after the last kill")
 arguments = parser.parse_args()
 GONIO = os.path.abspath(arguments.gonio)
 
@@ -108,7 +109,7 @@ def main():
         took = time.monotonic() - begin
 
         # Every 201 is there and comes to its end.
-        end = time.monotonic() + 300
+        end = time.monotonic() + arguments.patience
         unfinished = {job for _, job, _ in acknowledged}
         while unfinished and time.monotonic() < end:
             for job in list(unfinished):
