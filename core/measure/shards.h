@@ -11,8 +11,8 @@
 
 namespace gonio {
 
-// Where finished parts are kept, under keys that say what decided them: a part serves every job of which it is
-// a part. Both may be called from several threads at once.
+// Where finished parts are kept, under keys that say what decided them: a part serves every job of which it
+// is a part. Both may be called from several threads at once.
 class Checkpoints {
   public:
     virtual ~Checkpoints() = default;

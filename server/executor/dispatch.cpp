@@ -37,8 +37,7 @@ class Dispatcher {
             job_.forget_failure(index);  // of an earlier start
         }
         for (;;) {
-            std::erase_if(wanted,
-                          [&](const auto& shard) { return checkpoints_.load(shard.second.key); });
+            std::erase_if(wanted, [&](const auto& shard) { return checkpoints_.load(shard.second.key); });
             report(wanted.size());
             if (wanted.empty()) return;
             for (auto& [index, shard] : wanted) look_for_failure(index, shard);

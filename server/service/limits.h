@@ -11,8 +11,9 @@ struct ServiceLimits {
     double memory_bytes = 8 * double(1 << 30);  // predicted peak of a job
     double job_seconds = 24 * 3600;             // of computing: predicted before, stopped after
     int64_t queued_jobs = 1000;
-    int64_t jobs_per_user = 200;                // queued or running
-    int64_t stored_bytes = int64_t{100} << 30;  // of what is kept: checkpoints go first, then the least recently used
+    int64_t jobs_per_user = 200;  // queued or running
+    int64_t stored_bytes = int64_t{100}
+                           << 30;  // of what is kept: checkpoints go first, then the least recently used
     int event_streams = 64;
 };
 

@@ -40,7 +40,7 @@ struct Workplace {
 // A job that was checked and whose surface is in memory.
 struct PreparedJob {
     std::string job_hash;
-    std::string runs_hash;              // equal for jobs that can have runs in common; empty: it has no checkpoints
+    std::string runs_hash;  // equal for jobs that can have runs in common; empty: it has no checkpoints
     std::vector<std::string> surfaces;  // SHA-256 of what it reads in the store
     Prediction prediction;
     // A prediction for the same job at another target_relative_error; empty if it has none.

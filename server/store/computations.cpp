@@ -130,9 +130,10 @@ std::optional<ClaimedJob> Store::next_job() {
                   "version=version+1 WHERE id=?",
                   at, at, id)
             .run();
-        Statement(database,
-                  "UPDATE checkpoints SET last_used=? WHERE runs_hash=(SELECT runs_hash FROM jobs WHERE id=?)",
-                  at, id)
+        Statement(
+            database,
+            "UPDATE checkpoints SET last_used=? WHERE runs_hash=(SELECT runs_hash FROM jobs WHERE id=?)", at,
+            id)
             .run();
         return ClaimedJob{*find_job(database, id), oldest.text(1)};
     });

@@ -121,8 +121,8 @@ std::vector<ResultOutput> Store::results(const std::string& job_hash) {
 
 std::optional<Checkpoint> Store::load_checkpoint(const std::string& runs_hash, const std::string& key) {
     return readers_.read([&](Database& database) -> std::optional<Checkpoint> {
-        Statement row(database, "SELECT sha256, bytes FROM checkpoints WHERE runs_hash=? AND key=?", runs_hash,
-                      key);
+        Statement row(database, "SELECT sha256, bytes FROM checkpoints WHERE runs_hash=? AND key=?",
+                      runs_hash, key);
         if (!row.step()) return {};
         return Checkpoint{key, row.text(0), row.integer(1)};
     });

@@ -70,8 +70,8 @@ class Store {
     // the last one.
     bool try_again(const std::string& job_hash);
 
-    // Parts of a computation, found again after a crash and by later jobs of the same runs_hash. They stay until
-    // gc needs their room. An equal key is replaced.
+    // Parts of a computation, found again after a crash and by later jobs of the same runs_hash. They stay
+    // until gc needs their room. An equal key is replaced.
     void save_checkpoint(const std::string& job_hash, const std::string& runs_hash, const std::string& key,
                          const StoredObject& object);
     std::optional<Checkpoint> load_checkpoint(const std::string& runs_hash, const std::string& key);

@@ -557,8 +557,7 @@ TEST_F(StoreTest, RemovingAndWritingAtOnceLosesNothing) {
     std::thread collector([&] {
         while (!done) store->gc(int64_t{1} << 40);
     });
-    for (int k = 0; k < 200; ++k)
-        save_part("h", "key", std::to_string(k % 3));
+    for (int k = 0; k < 200; ++k) save_part("h", "key", std::to_string(k % 3));
     done = true;
     collector.join();
     EXPECT_TRUE(store->check(true).faults.empty());
