@@ -2,7 +2,6 @@
 #include "server/executor/dispatch.h"
 
 #include <CLI/CLI.hpp>
-#include <filesystem>
 #include <memory>
 
 #include "clients/cli/commands.h"
@@ -28,8 +27,10 @@ int run_dispatch(const DispatchedJob& dispatched, const CommonOptions& common) {
     const std::unique_ptr<Executor> executor = make_executor(dispatched.executor, dispatched.options);
     if (!common.quiet) print_surface(loaded.surface, std::cerr);
     const RunJob run = [&](const LoadedJob&, const RunOptions& options, const Monitor& monitor) {
-        const JobFolder folder(common.checkpoints, loaded, text, origin.folder,
-                               {dispatched.program, dispatched.options.threads}, options);
+        const JobFolder folder(
+            common.checkpoints, loaded, text, origin.folder,
+            {dispatched.program.empty() ? this_program() : dispatched.program, dispatched.options.threads},
+            options);
         return dispatch(loaded, folder, *executor, options, monitor);
     };
     const std::vector<OutputRequest> files = output_files(loaded, common.folder);
@@ -55,7 +56,6 @@ void add_dispatch(CLI::App& app, CommonOptions& common, Action& action) {
         "SBATCH_MEM_PER_CPU, "
         "SBATCH_TIMELIMIT.");
     const auto dispatched = std::make_shared<DispatchedJob>();
-    dispatched->program = std::filesystem::read_symlink("/proc/self/exe").string();
     command->add_option("JOB", dispatched->path, "Job document (JSON); - reads stdin")->required();
     command->add_option("-o,--output", common.folder, "Folder of the outputs")->capture_default_str();
     command
@@ -69,7 +69,8 @@ void add_dispatch(CLI::App& app, CommonOptions& common, Action& action) {
     command->add_option("--shard-threads", dispatched->options.threads, "Threads of each shard")
         ->check(CLI::Range(1, 1024))
         ->capture_default_str();
-    command->add_option("--program", dispatched->program, "gonio as the other machines call it (default: this one's path)");
+    command->add_option("--program", dispatched->program,
+                        "gonio as the other machines call it (default: this one's path)");
     command
         ->add_option("--reference", dispatched->reference_paths, "Path tracer, with this many paths a view")
         ->check(CLI::Range(1LL, 1LL << 40));

@@ -76,6 +76,13 @@ int execute_job(const Job& job, const CommonOptions& common,
     return 0;
 }
 
+std::string this_program() {
+    std::error_code failure;
+    const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe", failure);
+    if (failure) throw Error(ErrorCode::io, "/proc/self/exe", "", failure.message());
+    return program.string();
+}
+
 int exit_code(ErrorCode code) {
     switch (code) {
         case ErrorCode::usage:

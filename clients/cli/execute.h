@@ -33,6 +33,9 @@ void print_result(const LoadedJob& loaded, const Report& report, const std::vect
 
 // 1 failed, 2 wrong usage, 3 invalid input, 4 server unreachable, 5 cancelled, 6 beyond a limit, 130 Ctrl-C.
 int exit_code(ErrorCode code);
+
+// Its file, for others to call. Throws Error(io) where /proc does not tell.
+std::string this_program();
 // Of `gonio shard` and `gonio merge`, which need other shards first.
 inline constexpr int shards_missing_exit_code = 7;
 

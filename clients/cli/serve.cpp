@@ -4,12 +4,12 @@
 #include <CLI/CLI.hpp>
 #include <charconv>
 #include <csignal>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <thread>
 
 #include "clients/cli/commands.h"
+#include "clients/cli/execute.h"
 #include "server/http/bearer.h"
 #include "server/service/api.h"
 #include "server/service/engine.h"
@@ -105,8 +105,7 @@ int serve(const ServeOptions& serve, const CommonOptions& common) {
     if (!serve.executor.empty()) {
         options.executor = make_executor(serve.executor, serve.shards);
         options.shared_folder = serve.shared_folder.empty() ? serve.data + "/shards" : serve.shared_folder;
-        options.shard_command = {std::filesystem::read_symlink("/proc/self/exe").string(),
-                                 serve.shards.threads, true};
+        options.shard_command = {this_program(), serve.shards.threads, true};
     }
     options.on_end = [&](const std::string& process, const std::string& status, double seconds) {
         metrics.count_job(process, status, seconds);
