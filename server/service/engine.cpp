@@ -90,14 +90,14 @@ void Engine::work() {
 // The store's word, once the disk takes it.
 template <class Ask>
 auto Engine::insist(Ask&& ask) -> decltype(ask()) {
-    while (!ending_) {
+    for (;;) {
         try {
             return ask();
         } catch (const std::exception&) {
+            if (ending_) return {};  // the next start finds the job as a crash would leave it
             std::this_thread::sleep_for(between_looks);
         }
     }
-    return {};  // what is said nowhere else is said at the next start
 }
 
 // A running job that is dismissed must end within a second, one that is out of time at once. And what is

@@ -3,11 +3,13 @@
 
 Usage: serve_test.py GONIO SOURCE_FOLDER [unittest options]
 """
+import contextlib
 import hashlib
 import http.client
 import json
 import re
 import signal
+import sqlite3
 import subprocess
 import time
 import unittest
@@ -185,6 +187,8 @@ class Ends(Service):
         self.assertEqual(self.daemon.process.wait(20), 0)
         self.assertLess(time.monotonic() - begin, 10)
         self.daemon.process.stdout.close()
+        with contextlib.closing(sqlite3.connect(self.folder / "data/jobs.db")) as database:
+            self.assertEqual(database.execute("SELECT status, attempts FROM jobs").fetchall(), [("accepted", 0)], "back in the queue")
         self.start()
         self.assertEqual(self.wait(job)["status"], "successful")
         self.assertEqual(self.table(job), self.local(MEDIUM))
