@@ -2,7 +2,6 @@
 // values expected.
 #pragma once
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "measure/plan.h"
 #include "surface/generate.h"
+#include "validation/load_json.h"
 
 namespace gonio::reference {
 
@@ -56,13 +56,6 @@ struct Case {
         return material;
     }
 };
-
-inline nlohmann::json load_json(const std::string& name) {
-    const std::string path = GONIO_TEST_DATA "/validation/data/" + name + ".json";
-    std::ifstream file(path);
-    if (!file) throw std::runtime_error("cannot read " + path);
-    return nlohmann::json::parse(file);
-}
 
 // Cases of the families vgroove (Lambertian), rectgroove, spherical_pits, sinusoid and eggcrate.
 inline Case load_case(const std::string& name) {
