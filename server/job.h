@@ -40,7 +40,7 @@ struct GeneratedSurface {
 using SurfaceSource = std::variant<FileSurface, GridSurface, GeneratedSurface>;
 
 struct MaterialSource {
-    Material material;  // complete, or with an empty reflectance if there is a map
+    Material material;  // complete, or with an empty albedo if there is a map
     // Paths of images registered to the stored surface, one a channel; empty for constant albedo.
     std::vector<std::string> albedo_maps;
     HeightReader read = read_trusted_heights;

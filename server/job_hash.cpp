@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/sha256.h"
+#include "material/lobe_parameters.h"
 
 namespace gonio {
 namespace {
@@ -39,16 +40,61 @@ json canonical(const BrdfPlan& plan) {
     return j;
 }
 
-json canonical(const Lambertian& lambertian) {
-    json j{{"model", "lambertian"}};
-    if (lambertian.is_map()) {
-        const int sizes[] = {lambertian.map_nx, lambertian.map_ny};
-        j["albedo_map"] =
-            sha256_hex({bytes_of(sizes, 2), bytes_of(lambertian.map.data(), lambertian.map.size())});
+// One value or plane for each channel it may differ in: what is alike has one hash.
+void add_parameter(json& j, const std::string& name, const Parameter& parameter, size_t n_channels) {
+    const Parameter all = parameter.for_channels(n_channels);
+    if (all.is_map()) {
+        const int sizes[] = {all.map_nx, all.map_ny};
+        j[name + "_map"] = sha256_hex({bytes_of(sizes, 2), bytes_of(all.map.data(), all.map.size())});
     } else {
-        j["albedo"] = lambertian.albedo;
+        j[name] = all.constant;
     }
-    return j;
+}
+
+const char* model_name(const Lambertian&) {
+    return "lambertian";
+}
+const char* model_name(const Phong&) {
+    return "phong";
+}
+const char* model_name(const BlinnPhong&) {
+    return "blinn_phong";
+}
+const char* model_name(const Microfacet& lobe) {
+    return lobe.distribution == Microfacet::Distribution::ggx ? "ggx" : "beckmann";
+}
+const char* model_name(const CoatedDiffuse&) {
+    return "coated_diffuse";
+}
+const char* model_name(const Mirror&) {
+    return "mirror";
+}
+
+json canonical(const Lobe& lobe, size_t n_channels) {
+    return std::visit(
+        [&](const auto& kind) {
+            json j{{"model", model_name(kind)}};
+            visit_parameters(kind,
+                             [&](const char* name, const Parameter& parameter, const ParameterRange& range) {
+                                 add_parameter(j, name, parameter, range.by_channel ? n_channels : 1);
+                             });
+            return j;
+        },
+        lobe);
+}
+
+json canonical(const Material& material) {
+    const size_t n = material.channels.size();
+    const WeightedLobe& first = material.lobes.front();
+    if (material.lobes.size() == 1 && !first.weight.is_map() && first.weight.range().first == 1)
+        return canonical(first.lobe, n);
+    json parts = json::array();
+    for (const WeightedLobe& part : material.lobes) {
+        json j = canonical(part.lobe, n);
+        add_parameter(j, "weight", part.weight, n);
+        parts.push_back(std::move(j));
+    }
+    return {{"model", "mixture"}, {"parts", std::move(parts)}};
 }
 
 }  // namespace
@@ -61,8 +107,7 @@ std::string canonical_job(const std::string& surface_hash, const Material& mater
                           const ReferenceOptions* reference) {
     json j{{"engine", program_version()},
            {"surface", surface_hash},
-           {"material",
-            std::visit([](const auto& reflectance) { return canonical(reflectance); }, material.reflectance)},
+           {"material", canonical(material)},
            {"measure", std::visit([](const auto& kind) { return canonical(kind); }, plan)}};
     j["material"]["channels"] = material.channels;
     if (reference) j["reference"] = {{"paths", reference->paths}};

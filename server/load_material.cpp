@@ -50,7 +50,7 @@ RawHeights read_albedos(const std::string& path, const HeightReader& read) {
 
 // One channel's map, appended to the channels before it.
 void load_map(RawHeights raw, const std::string& path, const SurfaceSource& source,
-              const LoadedSurface& loaded, Lambertian& lambertian) {
+              const LoadedSurface& loaded, Parameter& albedo) {
     const int nx = loaded.stored_nx ? loaded.stored_nx : loaded.surface.nx;
     const int ny = loaded.stored_ny ? loaded.stored_ny : loaded.surface.ny;
     if (raw.nx != nx || raw.ny != ny) {
@@ -59,12 +59,12 @@ void load_map(RawHeights raw, const std::string& path, const SurfaceSource& sour
                         std::to_string(ny));
     }
     const HeightField map = prepare_surface(std::move(raw), registration(source)).surface;
-    lambertian.map_nx = loaded.surface.nx, lambertian.map_ny = loaded.surface.ny;
-    lambertian.map.reserve(lambertian.map.size() + loaded.surface.heights.size());
-    for (int j = 0; j < lambertian.map_ny; ++j) {
-        for (int i = 0; i < lambertian.map_nx; ++i) {
+    albedo.map_nx = loaded.surface.nx, albedo.map_ny = loaded.surface.ny;
+    albedo.map.reserve(albedo.map.size() + loaded.surface.heights.size());
+    for (int j = 0; j < albedo.map_ny; ++j) {
+        for (int i = 0; i < albedo.map_nx; ++i) {
             const float above_mean = map.at(mirrored_cell(i, map.nx), mirrored_cell(j, map.ny));
-            lambertian.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
+            albedo.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
         }
     }
 }
@@ -75,10 +75,10 @@ Material load_material(const MaterialSource& source, const SurfaceSource& surfac
                        const LoadedSurface& surface) {
     Material material = source.material;
     if (!source.albedo_maps.empty()) {
-        Lambertian lambertian;
+        Parameter albedo;
         for (const std::string& path : source.albedo_maps)
-            load_map(read_albedos(path, source.read), path, surface_source, surface, lambertian);
-        material.reflectance = std::move(lambertian);
+            load_map(read_albedos(path, source.read), path, surface_source, surface, albedo);
+        material.lobes = {{1.0, Lambertian{std::move(albedo)}}};
     }
     validate(material, surface.surface.nx, surface.surface.ny);
     return material;

@@ -16,9 +16,7 @@ std::vector<double> albedos(const JsonNode& node) {
 }
 
 Material constant_albedo(std::vector<std::string> channels, std::vector<double> albedo) {
-    Lambertian lambertian;
-    lambertian.albedo = std::move(albedo);
-    return {std::move(channels), std::move(lambertian)};
+    return {std::move(channels), Lambertian{std::move(albedo)}};
 }
 
 // The paths of maps, one a channel.

@@ -56,9 +56,9 @@ class Measurement {
     BrdfResult run() {
         Report& report = result_.report;
         const double most = albedo_range().second;
-        if (options_.allow_skips && is_plane(scene_.surface) && !scene_.material.is_map()) {
+        if (options_.allow_skips && is_plane(scene_.surface) && !scene_.material.albedo.is_map()) {
             report.skipped.push_back({"all tracing", "the surface is a plane: f = albedo / pi exactly"});
-            fill_exact([&](size_t c) { return scene_.material.albedo[c] / pi; });
+            fill_exact([&](size_t c) { return scene_.material.albedo.constant[c] / pi; });
         } else if (options_.allow_skips && most == 0) {
             report.skipped.push_back({"all tracing", "the surface is black"});
             fill_exact([](size_t) { return 0.0; });
@@ -71,15 +71,7 @@ class Measurement {
     }
 
   private:
-    std::pair<double, double> albedo_range() const {
-        const Lambertian& m = scene_.material;
-        if (m.is_map()) {
-            const auto [low, high] = std::minmax_element(m.map.begin(), m.map.end());
-            return {*low, *high};
-        }
-        const auto [low, high] = std::minmax_element(m.albedo.begin(), m.albedo.end());
-        return {*low, *high};
-    }
+    std::pair<double, double> albedo_range() const { return scene_.material.albedo.range(); }
 
     template <class Value>
     void fill_exact(Value&& value) {
@@ -133,10 +125,10 @@ class Measurement {
         context_.skip_steep = options_.allow_skips;
         context_.keep_orders = plan_.separate_orders || !options_.allow_skips;
         context_.max_order = plan_.max_order;
-        if (result_.table.channels.size() > 1 && !scene_.material.is_map())
+        if (result_.table.channels.size() > 1 && !scene_.material.albedo.is_map())
             report.skipped.push_back(
                 {"all channels but one", "constant albedo: orders are kept apart and serve every channel"});
-        if (!context_.keep_orders && (result_.table.channels.size() == 1 || scene_.material.is_map()))
+        if (!context_.keep_orders && (result_.table.channels.size() == 1 || scene_.material.albedo.is_map()))
             report.skipped.push_back(
                 {"a product per order", "one channel, orders not asked for: they are summed first"});
 
@@ -299,7 +291,7 @@ void Measurement::find_mesh_bias(const std::vector<Stage>& stages) {
                 {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});
         return;
     }
-    const double albedo = scene_.material.is_map() ? 1.0 : albedo_range().second;
+    const double albedo = scene_.material.albedo.is_map() ? 1.0 : albedo_range().second;
     mesh_bias_ = mesh_bias_from(shards_.part(part_key(stages.back(), "mesh"), [&] {
         return to_bytes(measure_mesh_bias(context_, stages.back().settings, albedo * stages.back().ratio,
                                           options_.n_threads, monitor_));
@@ -409,7 +401,11 @@ BrdfResult measure_brdf(const HeightField& surface, const Material& material, co
     if (plan.incident.empty() || plan.outgoing.empty())
         throw Error(ErrorCode::invalid_input, "/measure", "",
                     "needs at least one incident and one outgoing direction");
-    return Measurement(surface, std::get<Lambertian>(material.reflectance), material, plan, options, monitor)
+    const Lambertian* lambertian = pure_lambertian(material);
+    if (!lambertian)
+        throw Error(ErrorCode::invalid_input, "/material", "", "only Lambertian facets are measured so far");
+    return Measurement(surface, {lambertian->albedo.for_channels(material.channels.size())}, material, plan,
+                       options, monitor)
         .run();
 }
 

@@ -24,12 +24,9 @@ std::string mesh_bias_in_words(const MeshBias& mesh_bias) {
 }
 
 double noise_correction_percent(const RunContext& context, const Stage& stage) {
-    const Lambertian& m = *context.material;
-    const std::vector<double> one{1.0};
-    const std::vector<double>& albedo = m.is_map() ? one : m.albedo;
-    return stage.noise
-               ? -100 * stage.noise->kappa * std::pow(*std::max_element(albedo.begin(), albedo.end()), 2)
-               : 0.0;
+    const Parameter& albedo = context.material->albedo;
+    const double largest = albedo.is_map() ? 1.0 : albedo.range().second;
+    return stage.noise ? -100 * stage.noise->kappa * std::pow(largest, 2) : 0.0;
 }
 
 int unresolved_directions(const RunContext& context, const Stage& stage) {

@@ -18,20 +18,21 @@ double direct_part(const RunContext& context, const Stage& stage, size_t channel
     const size_t rows = context.rows();
     if (slices > 1) return f[(channel * slices + 1) * rows + row];
     const double direct = stage.direct.mean()[row];
-    const Lambertian& m = *context.material;
-    if (!m.is_map()) return direct * m.albedo[channel];
+    const Parameter& albedo = context.material->albedo;
+    if (!albedo.is_map()) return direct * albedo.constant[channel];
     return channel == 0 ? direct : f[row] > 0 ? direct / f[row] * f[channel * rows + row] : 0.0;
 }
 
 // What multiplies K at each order.
 double albedo_of(const RunContext& context, size_t channel) {
-    return context.material->is_map() ? 1.0 : context.material->albedo[channel];
+    const Parameter& albedo = context.material->albedo;
+    return albedo.is_map() ? 1.0 : albedo.constant[channel];
 }
 
-double mean_albedo(const Lambertian& m, size_t channel) {
-    if (!m.is_map()) return m.albedo[channel];
-    const size_t n = static_cast<size_t>(m.map_nx) * m.map_ny;
-    const auto first = m.map.begin() + static_cast<long>(channel * n);
+double mean_albedo(const Parameter& albedo, size_t channel) {
+    if (!albedo.is_map()) return albedo.constant[channel];
+    const size_t n = static_cast<size_t>(albedo.map_nx) * albedo.map_ny;
+    const auto first = albedo.map.begin() + static_cast<long>(channel * n);
     return std::accumulate(first, first + static_cast<long>(n), 0.0) / static_cast<double>(n);
 }
 
@@ -108,8 +109,9 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
         for (size_t c = 0; c < n_channels; ++c) {
             for (size_t slice = 0; slice < slices; ++slice) {
                 const MeshShare mesh =
-                    slice >= 2 ? mesh_bias.share_of_order(static_cast<int>(slice))
-                               : mesh_bias.share_of_sum(mean_albedo(*context.material, c), context.max_order);
+                    slice >= 2
+                        ? mesh_bias.share_of_order(static_cast<int>(slice))
+                        : mesh_bias.share_of_sum(mean_albedo(context.material->albedo, c), context.max_order);
                 for (size_t r = 0; r < rows; ++r) {
                     const size_t i = (c * slices + slice) * rows + r;
                     const double f = stage.f.mean()[i], direct = direct_part(context, stage, c, slices, r);
@@ -151,12 +153,13 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
             }
 
     double random = 0, systematic = 0, direct = 0;
-    const Lambertian& m = *context.material;
+    const Parameter& albedo = context.material->albedo;
+    const std::vector<double>& values = albedo.constant;
     const size_t brightest =
-        m.is_map()
+        albedo.is_map()
             ? 0
-            : static_cast<size_t>(std::max_element(m.albedo.begin(), m.albedo.end()) - m.albedo.begin());
-    const double unit_direct = m.is_map() ? 1.0 : m.albedo[brightest];
+            : static_cast<size_t>(std::max_element(values.begin(), values.end()) - values.begin());
+    const double unit_direct = albedo.is_map() ? 1.0 : values[brightest];
     const std::vector<double> direct_se = standard_errors(stages.back().direct, 0, groups);
     for (size_t c = 0; c < n_channels; ++c) {
         const size_t first = c * slices * rows;

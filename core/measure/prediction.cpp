@@ -47,9 +47,9 @@ double seconds_of_run(double unknowns, double directions, const RunSettings& set
 }
 
 double mean_albedo(const Material& material) {
-    const auto& lambertian = std::get<Lambertian>(material.reflectance);
-    const auto& values = lambertian.albedo;
-    if (lambertian.is_map() || values.empty()) return 0.5;
+    const Lambertian* lambertian = pure_lambertian(material);
+    if (!lambertian || lambertian->albedo.is_map() || lambertian->albedo.empty()) return 0.5;
+    const std::vector<double>& values = lambertian->albedo.constant;
     double sum = 0;
     for (const double albedo : values) sum += albedo;
     return sum / static_cast<double>(values.size());
@@ -62,7 +62,9 @@ Prediction predict_brdf(const HeightField& surface, const Material& material, co
     RunContext context;
     context.surface = &surface;
     context.plan = &plan;
-    context.material = &std::get<Lambertian>(material.reflectance);
+    const Lambertian gray{Parameter(0.5).for_channels(material.channels.size())},
+        *lambertian = pure_lambertian(material);
+    context.material = lambertian ? lambertian : &gray;
     const double cells = static_cast<double>(surface.nx) * surface.ny,
                  window_cells = std::pow(tile_core + 2.0 * tile_halo, 2),
                  directions = distinct_directions(plan), target = plan.accuracy.target();

@@ -57,6 +57,9 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
                              const ReferenceOptions& reference, const RunOptions& options,
                              const Monitor& monitor) {
     validate(material, surface.nx, surface.ny);
+    const Lambertian* lambertian = pure_lambertian(material);
+    if (!lambertian)
+        throw Error(ErrorCode::invalid_input, "/material", "", "only Lambertian facets are measured so far");
     if (reference.paths < 1)
         throw Error(ErrorCode::invalid_input, "paths", std::to_string(reference.paths), "at least 1");
     if (plan.separate_orders && plan.max_order < 1)
@@ -85,9 +88,8 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
 
     monitor.report({0, "building the scene", 0});
     const double start = cpu_seconds();
-    const auto& lambertian = std::get<Lambertian>(material.reflectance);
     const PathTracer tracer(
-        surface, lambertian, static_cast<int>(n_channels),
+        surface, *lambertian, static_cast<int>(n_channels),
         {reference.paths, plan.max_order, table.orders, plan.accuracy.seed, options.allow_skips});
     const double built = cpu_seconds();
 

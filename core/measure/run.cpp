@@ -105,8 +105,8 @@ std::vector<Block> make_blocks(const RunContext& context, const RunSettings& set
 
 std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& tile) {
     std::vector<ChannelFactors> factors;
-    const Lambertian& m = *context.material;
-    if (!m.is_map()) return factors;
+    const Parameter& albedo = context.material->albedo;
+    if (!albedo.is_map()) return factors;
     for (size_t c = 0; c < context.n_channels(); ++c) {
         ChannelFactors f(tile.n_slots(), 0.0f);
         for (int kind = 0; kind < 2; ++kind)
@@ -114,7 +114,8 @@ std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& t
                 for (int column = 0; column < tile.area.width; ++column) {
                     const int i = wrap_index(tile.area.x0 + column, tile.nx),
                               j = wrap_index(tile.area.y0 + row, tile.ny);
-                    f[tile.slot(kind, row, column)] = std::sqrt(m.map[(c * m.map_ny + j) * m.map_nx + i]);
+                    f[tile.slot(kind, row, column)] =
+                        std::sqrt(albedo.map[(c * albedo.map_ny + j) * albedo.map_nx + i]);
                 }
         factors.push_back(std::move(f));
     }
@@ -162,13 +163,13 @@ struct Sums {
 void write_rows(const RunContext& context, const Block& block, const Sums& sums, size_t slices,
                 RunValues& values) {
     const size_t n_rows = context.rows(), n_channels = context.n_channels();
-    const bool map = context.material->is_map(),
+    const bool map = context.material->albedo.is_map(),
                open = context.surface->border_x > 0 || context.surface->border_y > 0;
     auto view_of = [&](const Block::Row& row) {
         return block.same ? context.lights[block.lights[row.view]] : context.views[block.views[row.view]];
     };
     for (size_t c = 0; c < n_channels; ++c) {
-        const double albedo = map ? 1.0 : context.material->albedo[c];
+        const double albedo = map ? 1.0 : context.material->albedo.constant[c];
         const Matrix& direct = sums.direct[map ? c : 0];
         const std::vector<Matrix>& orders = sums.orders[map ? c : 0];
         for (const Block::Row& row : block.rows) {
@@ -214,7 +215,8 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
     const auto padded = [](int n) { return (n + column_block - 1) / column_block * column_block; };
     // Irradiance, carried orders (three at once is typical), a second copy with several sub-samples or a map;
     // sums in double.
-    const double copies = 4.0 + (settings.sub_samples > 1 ? 1 : 0) + (context.material->is_map() ? 1 : 0) +
+    const double copies = 4.0 + (settings.sub_samples > 1 ? 1 : 0) +
+                          (context.material->albedo.is_map() ? 1 : 0) +
                           (context.keep_orders || context.n_channels() > 1 ? 4 : 0);
     const double sums = static_cast<double>(padded(n_lights)) *
                         padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
@@ -295,7 +297,7 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     options.fixed_applications = values.applications;
                 options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
                 options.keep_orders = context.keep_orders;
-                if (!context.material->is_map()) options.albedos = context.material->albedo;
+                if (!context.material->albedo.is_map()) options.albedos = context.material->albedo.constant;
                 const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),
                              base_views = factors.size() > 1 ? irradiance.views : Fields();
                 for (size_t c = 0; c < std::max<size_t>(1, factors.size()); ++c) {

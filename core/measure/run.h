@@ -16,7 +16,7 @@ namespace gonio {
 struct RunContext {
     const HeightField* surface = nullptr;
     const MarchGrid* grid = nullptr;
-    const Lambertian* material = nullptr;
+    const Lambertian* material = nullptr;  // its albedo with a value or a plane for each channel
     const BrdfPlan* plan = nullptr;
     std::vector<Vec3> lights, views;  // of plan->incident and plan->outgoing
     // views[v] == lights[view_to_light[v]] for all v, and every light is a view: half the work. Empty
@@ -34,11 +34,7 @@ struct RunContext {
     long long max_bytes = 0;  // for one run
 
     size_t rows() const { return plan->pairs.empty() ? lights.size() * views.size() : plan->pairs.size(); }
-    size_t n_channels() const {
-        return material->is_map()
-                   ? material->map.size() / (static_cast<size_t>(material->map_nx) * material->map_ny)
-                   : material->albedo.size();
-    }
+    size_t n_channels() const { return material->albedo.n_channels(); }
 };
 
 struct RunSettings {

@@ -48,7 +48,7 @@ bool is_plane(const HeightField& surface) {
 SimplifiedScene simplify_scene(const HeightField& surface, const Lambertian& material, bool allow_skips) {
     SimplifiedScene scene{surface, material, false, {}};
     HeightField& s = scene.surface;
-    if (allow_skips && !material.is_map()) {
+    if (allow_skips && !material.albedo.is_map()) {
         if (s.ny > 1 && rows_alike(s)) {
             keep_one_row(s);
             scene.skipped.push_back({"all rows but one", "the surface does not change along y"});
@@ -62,8 +62,9 @@ SimplifiedScene simplify_scene(const HeightField& surface, const Lambertian& mat
     if (s.nx == 1 && s.ny > 1) {
         s = swap_axes(s);
         scene.axes_swapped = !scene.axes_swapped;
-        if (material.is_map())
-            std::swap(scene.material.map_nx, scene.material.map_ny);  // one column: the order of values stays
+        if (material.albedo.is_map())
+            std::swap(scene.material.albedo.map_nx,
+                      scene.material.albedo.map_ny);  // one column: the order of values stays
     }
     return scene;
 }

@@ -81,9 +81,7 @@ Vec3 PathTracer::facet_normal(const SceneHit& hit) const {
 }
 
 double PathTracer::albedo(const SceneHit& hit, int channel) const {
-    if (!material_.is_map()) return material_.albedo[channel];
-    const size_t row = static_cast<size_t>(channel) * material_.map_ny + hit.j;
-    return material_.map[row * material_.map_nx + hit.i];
+    return material_.albedo.at(channel, hit.i, hit.j);
 }
 
 bool PathTracer::can_hit(const Vec3& d) const {

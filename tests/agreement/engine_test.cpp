@@ -108,7 +108,7 @@ TEST(FastEngineAgrees, PitchThatIsNotSquare) {
 
 TEST(FastEngineAgrees, AlbedoMaps) {
     const HeightField field = generate_gaussian(96, 96, 1, 6, 1.0, 9);
-    Lambertian map;
+    Parameter map;
     map.map_nx = map.map_ny = 96;
     // Three channels: bright valleys, stripes across x, and noise.
     std::mt19937_64 random(4);
@@ -118,7 +118,7 @@ TEST(FastEngineAgrees, AlbedoMaps) {
         map.map[field.heights.size() + k] = k % 96 / 8 % 2 ? 1.0f : 0.0f;
         map.map[2 * field.heights.size() + k] = std::uniform_real_distribution<float>(0, 1)(random);
     }
-    expect_agree("map of 3 channels", field, {{"valleys", "stripes", "noise"}, map},
+    expect_agree("map of 3 channels", field, {{"valleys", "stripes", "noise"}, Lambertian{map}},
                  plan_for_target(lights(), views(), 0.005));
 }
 

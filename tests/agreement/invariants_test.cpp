@@ -290,12 +290,7 @@ TEST(Invariants, OrdersGiveAnyAlbedo) {
 
 TEST(Invariants, ConstantMapIsAConstantAlbedo) {
     const HeightField surface = generate_gaussian(40, 36, 1e-4, 5e-4, 1, 7);
-    Lambertian map;
-    map.map_nx = 40, map.map_ny = 36;
-    map.map.assign(40 * 36, 0.6f);
-    Material material;
-    material.channels = {"y"};
-    material.reflectance = map;
+    const Material material({"y"}, Lambertian{Parameter::mapped(40, 36, std::vector<float>(40 * 36, 0.6f))});
     const Table a = measure(surface, material, plan_of(lights, views, some)).table;
     const Table b = measure(surface, gray({0.6}), plan_of(lights, views, some)).table;
     for (size_t row = 0; row < a.rows(); ++row)

@@ -14,7 +14,7 @@ inline Material gray(const std::vector<double>& albedo) {
     lambertian.albedo = albedo;
     Material material;
     for (size_t c = 0; c < albedo.size(); ++c) material.channels.push_back("c" + std::to_string(c));
-    material.reflectance = lambertian;
+    material.lobes = {{1.0, lambertian}};
     return material;
 }
 

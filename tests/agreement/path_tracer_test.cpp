@@ -242,14 +242,14 @@ TEST(PathTracer, RouletteIsUnbiased) {
 
 TEST(PathTracer, AlbedoMapLightsOneWall) {
     const HeightField groove = generate_v_groove(8, 2, 45);
-    Lambertian map;
+    Parameter map;
     map.map_nx = 8;
     map.map_ny = 1;
     // Cells 0-3 ascend from the valley at x = 0 to the ridge at x = 1, cells 4-7 descend; channel b is black
     // on the ascent.
     map.map = {0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0.5f, 0, 0, 0, 0, 0.5f, 0.5f, 0.5f, 0.5f};
     BrdfPlan plan = pair_plan({{{30, 0}, {20, 40}}, {{50, 180}, {20, 40}}, {{70, 30}, {60, 0}}});
-    const BrdfResult mapped = trace(groove, {{"a", "b"}, map}, plan, 20000);
+    const BrdfResult mapped = trace(groove, {{"a", "b"}, Lambertian{map}}, plan, 20000);
     const BrdfResult constant = trace(groove, gray(0.5), plan, 20000);
     std::vector<double> pulls;
     for (size_t row = 0; row < 3; ++row) {

@@ -40,7 +40,7 @@ inline std::vector<AnglesDeg> sixty_four_directions() {
 }
 
 inline Material lambertian(double albedo) {
-    return {{"y"}, Lambertian{{albedo}, 0, 0, {}}};
+    return {{"y"}, Lambertian{albedo}};
 }
 
 }  // namespace gonio::bench

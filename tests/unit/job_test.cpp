@@ -458,19 +458,19 @@ class AlbedoMap : public testing::Test {
     }
     void TearDown() override { std::filesystem::remove_all(folder_); }
 
-    Lambertian load(const json& surface_options, const std::string& map = "map.txt") const {
+    Parameter load(const json& surface_options, const std::string& map = "map.txt") const {
         json document = base_document({{"material", {{"albedo", {{"file", map}}}}}});
         document["surface"] = {{"grid", {{0, 1, 2}, {3, 4, 5}}}, {"pitch", "1 mm"}, {"height_scale", "1 um"}};
         document["surface"].update(surface_options);
         const LoadedJob loaded = load_job(parse_job(document.dump(), {"x", folder_.string()}));
-        const Lambertian map_of_cells = std::get<Lambertian>(loaded.material.reflectance);
+        const Parameter map_of_cells = pure_lambertian(loaded.material)->albedo;
         EXPECT_EQ(map_of_cells.map_nx, loaded.surface.surface.nx);
         EXPECT_EQ(map_of_cells.map_ny, loaded.surface.surface.ny);
         return map_of_cells;
     }
-    static void expect_map(const Lambertian& lambertian, const std::vector<double>& expected) {
-        ASSERT_EQ(lambertian.map.size(), expected.size());
-        for (size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(lambertian.map[k], expected[k], 1e-7) << k;
+    static void expect_map(const Parameter& albedo, const std::vector<double>& expected) {
+        ASSERT_EQ(albedo.map.size(), expected.size());
+        for (size_t k = 0; k < expected.size(); ++k) EXPECT_NEAR(albedo.map[k], expected[k], 1e-7) << k;
     }
 
     std::filesystem::path folder_ =
@@ -487,14 +487,14 @@ TEST_F(AlbedoMap, FollowsTheSurface) {
 
 TEST_F(AlbedoMap, MirrorsCellsAndNotNodes) {
     // Cell k lies between nodes k and k + 1. Nodes go 0 1 2 2 1 0, so cells go 0 1 (flat) 1 0 (flat).
-    const Lambertian lambertian = load({{"boundary", "mirror"}});
-    ASSERT_EQ(lambertian.map_nx, 6);
-    ASSERT_EQ(lambertian.map_ny, 4);
+    const Parameter albedo = load({{"boundary", "mirror"}});
+    ASSERT_EQ(albedo.map_nx, 6);
+    ASSERT_EQ(albedo.map_ny, 4);
     const double row0[] = {0, 0.1, 0.2, 0.1, 0, 0}, row1[] = {0.3, 0.4, 0.5, 0.4, 0.3, 0.3};
     for (int i = 0; i < 6; ++i) {
-        EXPECT_NEAR(lambertian.map[i], row0[i], 1e-7);
-        EXPECT_NEAR(lambertian.map[6 + i], row1[i], 1e-7);
-        EXPECT_NEAR(lambertian.map[12 + i], row0[i], 1e-7);
+        EXPECT_NEAR(albedo.map[i], row0[i], 1e-7);
+        EXPECT_NEAR(albedo.map[6 + i], row1[i], 1e-7);
+        EXPECT_NEAR(albedo.map[12 + i], row0[i], 1e-7);
     }
 }
 
@@ -507,11 +507,11 @@ TEST_F(AlbedoMap, HasAFileForEachChannel) {
     };
     const Material rgb = loaded({{"files", {"map.txt", "dark.txt", "map.txt"}}});
     EXPECT_EQ(rgb.channels, (std::vector<std::string>{"r", "g", "b"}));
-    expect_map(std::get<Lambertian>(rgb.reflectance),
+    expect_map(pure_lambertian(rgb)->albedo,
                {0, 0.1, 0.2, 0.3, 0.4, 0.5, 0, 0, 0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4, 0.5});
     const Material spectrum = loaded({{"wavelengths_nm", {450, 600}}, {"files", {"dark.txt", "map.txt"}}});
     EXPECT_EQ(spectrum.channels, (std::vector<std::string>{"450nm", "600nm"}));
-    expect_map(std::get<Lambertian>(spectrum.reflectance), {0, 0, 0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4, 0.5});
+    expect_map(pure_lambertian(spectrum)->albedo, {0, 0, 0.1, 0, 0, 0, 0, 0.1, 0.2, 0.3, 0.4, 0.5});
     EXPECT_THROW(loaded({{"files", {"map.txt", "dark.txt"}}}), Error);
     EXPECT_THROW(loaded({{"wavelengths_nm", {450, 600}}, {"files", {"map.txt"}}}), Error);
 }

@@ -389,19 +389,20 @@ TEST(Material, ValidationNamesTheField) {
     EXPECT_NO_THROW(validate(m, 4, 4));
     for (const double bad : {-0.1, 1.1, std::nan("")}) {
         scalar.albedo = {bad};
-        m.reflectance = scalar;
+        m.lobes = {{1.0, scalar}};
         EXPECT_EQ(error_of([&] { validate(m, 4, 4); }).field(), "/material/albedo");
     }
-    m.channels = {"r", "g"};
+    scalar.albedo = {0.8, 0.7, 0.6};
+    m = {{"r", "g"}, scalar};
     EXPECT_EQ(error_of([&] { validate(m, 4, 4); }).field(), "/material/albedo");
-    Lambertian map;
+    Parameter map;
     map.map_nx = 2, map.map_ny = 2;
     map.map.assign(8, 0.5f);
-    m.reflectance = map;
+    m.lobes = {{1.0, Lambertian{map}}};
     EXPECT_NO_THROW(validate(m, 2, 2));
-    EXPECT_EQ(error_of([&] { validate(m, 2, 3); }).field(), "/material/map");
+    EXPECT_EQ(error_of([&] { validate(m, 2, 3); }).field(), "/material/albedo");
     map.map[4 + 3] = 1.5f;
-    m.reflectance = map;
+    m.lobes = {{1.0, Lambertian{map}}};
     EXPECT_NE(error_of([&] { validate(m, 2, 2); }).field().find("column 1, row 1"), std::string::npos);
     m.channels.clear();
     EXPECT_EQ(error_of([&] { validate(m, 2, 2); }).field(), "/material");

@@ -104,7 +104,6 @@ void compare_albedos(const Case& expected, const HeightField& surface, const Acc
     if (!expected.document.contains("albedo_entries")) return;
     std::vector<double> albedos;
     BrdfPlan plan;
-    Lambertian lambertian;
     Material material;
     const auto index_of = [](auto& list, const auto& value) {
         const auto found = std::find(list.begin(), list.end(), value);
@@ -120,11 +119,11 @@ void compare_albedos(const Case& expected, const HeightField& surface, const Acc
     for (const auto& entry : expected.document.at("albedo_entries")) {
         const AnglesDeg wi = entry.at("wi").is_array() ? AnglesDeg{entry.at("wi").at(0), entry.at("wi").at(1)}
                                                        : AnglesDeg{40, 25};  // "any"
-        wanted.push_back({index_of(plan.incident, wi),
-                          index_of(lambertian.albedo, entry.at("rho").get<double>()), entry.at("value")});
+        wanted.push_back({index_of(plan.incident, wi), index_of(albedos, entry.at("rho").get<double>()),
+                          entry.at("value")});
     }
-    for (const double albedo : lambertian.albedo) material.channels.push_back(std::to_string(albedo));
-    material.reflectance = lambertian;
+    for (const double albedo : albedos) material.channels.push_back(std::to_string(albedo));
+    material.lobes = {{1.0, Lambertian{albedos}}};
     plan.outgoing = equal_projected_hemisphere(n_views);
     const Table table = measure(surface, material, plan, samples).table;
     const size_t n = plan.outgoing.size();

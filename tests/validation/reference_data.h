@@ -41,18 +41,18 @@ struct Case {
     // One channel for each albedo of the quantities of all orders (order == 0), in their order; albedo 1 for
     // single orders.
     Material material(bool single_orders) const {
-        Lambertian lambertian;
+        std::vector<double> albedos;
         Material material;
         for (const Quantity& quantity : quantities)
             if (!single_orders && quantity.order == 0) {
-                lambertian.albedo.push_back(quantity.albedo);
+                albedos.push_back(quantity.albedo);
                 material.channels.push_back(quantity.key);
             }
         if (single_orders) {
-            lambertian.albedo = {1};
+            albedos = {1};
             material.channels = {"y"};
         }
-        material.reflectance = lambertian;
+        material.lobes = {{1.0, Lambertian{albedos}}};
         return material;
     }
 };
