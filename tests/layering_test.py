@@ -16,7 +16,7 @@ HOMES = {
     r"ceres/": ["fitting/"],
     r"httplib": ["server/http", "clients/cli/remote.cpp"],
     r"nlohmann/": ["server/", "core/table/io/json.cpp", "clients/cli/"],
-    r"hwy/": ["core/visibility/march.cpp", "core/scattering/kernels.cpp"],
+    r"hwy/": ["core/visibility/march.cpp", "core/visibility/horizon_sweep.cpp", "core/scattering/kernels.cpp"],
     r"cblas": ["core/scattering/fields.cpp"],
     r"Imf": ["core/surface/io/exr.cpp", "core/table/io/exr.cpp"],
     r"png\.h": ["core/surface/io/png.cpp", "server/service/hillshade.cpp"],

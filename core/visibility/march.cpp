@@ -177,8 +177,9 @@ void march_lines(const MarchPlane& plane, const RayBundle& bundle, float highest
         }
 }
 
+template <bool kWantTravel>
 void horizon_lines(const MarchPlane& plane, const RayBundle& bundle, float highest, int column, int row,
-                   int width, int n_lines, float* slope) {
+                   int width, int n_lines, float* slope, float* travel) {
     const D d;
     const int lanes = static_cast<int>(hn::Lanes(d)), words = words_for(width);
     const VF top = hn::Set(d, highest);
@@ -188,7 +189,7 @@ void horizon_lines(const MarchPlane& plane, const RayBundle& bundle, float highe
                 &plane, &bundle, highest, (row + line) % plane.ny, (column + word * march_block) % plane.nx,
                 0};
             for (; b.lane < march_block; b.lane += lanes) {
-                VF height, best = hn::Zero(d);
+                VF height, best = hn::Zero(d), best_travel = hn::Zero(d);
                 M front;
                 start_rays(b, 0, height, front);
                 const VF headroom = hn::Sub(top, height);
@@ -210,14 +211,27 @@ void horizon_lines(const MarchPlane& plane, const RayBundle& bundle, float highe
                         const float* p = node_at(plane, plane.heights, b, c.column, c.row);
                         const VF edge = hn::MulAdd(hn::LoadU(d, p + c.second_node), hn::Set(d, c.weight1),
                                                    hn::Mul(hn::LoadU(d, p), hn::Set(d, c.weight0)));
-                        best = hn::Max(
-                            best, hn::Mul(hn::Sub(edge, height), hn::Set(d, 1 / bundle.facets[k].travel)));
+                        const VF seen =
+                            hn::Mul(hn::Sub(edge, height), hn::Set(d, 1 / bundle.facets[k].travel));
+                        if constexpr (kWantTravel)
+                            best_travel = hn::IfThenElse(hn::Gt(seen, best),
+                                                         hn::Set(d, bundle.facets[k].travel), best_travel);
+                        best = hn::Max(best, seen);
                     }
                 }
-                hn::StoreU(best, d,
-                           slope + (static_cast<size_t>(line) * words + word) * march_block + b.lane);
+                const size_t to = (static_cast<size_t>(line) * words + word) * march_block + b.lane;
+                hn::StoreU(best, d, slope + to);
+                if constexpr (kWantTravel) hn::StoreU(best_travel, d, travel + to);
             }
         }
+}
+
+void horizon_slopes(const MarchPlane& plane, const RayBundle& bundle, float highest, int column, int row,
+                    int width, int n_lines, float* slope, float* travel) {
+    if (travel)
+        horizon_lines<true>(plane, bundle, highest, column, row, width, n_lines, slope, travel);
+    else
+        horizon_lines<false>(plane, bundle, highest, column, row, width, n_lines, slope, nullptr);
 }
 
 }  // namespace HWY_NAMESPACE
@@ -229,7 +243,7 @@ namespace gonio {
 namespace {
 
 HWY_EXPORT(march_lines);
-HWY_EXPORT(horizon_lines);
+HWY_EXPORT(horizon_slopes);
 
 const MarchPlane& plane_of(const MarchGrid& grid, const RayBundle& bundle) {
     return bundle.transposed ? grid.transposed : grid.rows;
@@ -279,26 +293,31 @@ void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int 
      out.hit.data(), out.crossing.data());
 }
 
-void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect,
-                   float* horizon_slope) {
+void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, float* horizon_slope,
+                   float* horizon_distance) {
     const int lines = bundle.transposed ? rect.width : rect.height,
               length = bundle.transposed ? rect.height : rect.width;
     const int padded = words_for(length) * march_block;
-    std::vector<float> slope(static_cast<size_t>(lines) * padded);
-    HWY_DYNAMIC_DISPATCH(horizon_lines)
+    std::vector<float> slope(static_cast<size_t>(lines) * padded),
+        travel(horizon_distance ? slope.size() : 0);
+    HWY_DYNAMIC_DISPATCH(horizon_slopes)
     (plane_of(grid, bundle), bundle, grid.highest, bundle.transposed ? rect.y0 : rect.x0,
-     bundle.transposed ? rect.x0 : rect.y0, length, lines, slope.data());
+     bundle.transposed ? rect.x0 : rect.y0, length, lines, slope.data(),
+     horizon_distance ? travel.data() : nullptr);
     // Heights are in pitch_x and travel in cells: a cell of travel is hypot(pitch_x step_x, pitch_y step_y)
     // long.
     const double step_x = bundle.transposed ? bundle.direction.step_y : bundle.direction.step_x;
     const double step_y = bundle.transposed ? bundle.direction.step_x : bundle.direction.step_y;
-    const float metric =
-        static_cast<float>(grid.pitch_x / std::hypot(step_x * grid.pitch_x, step_y * grid.pitch_y));
-    for (int r = 0; r < rect.height; ++r)
-        for (int c = 0; c < rect.width; ++c)
-            horizon_slope[static_cast<size_t>(r) * rect.width + c] =
-                metric * slope[bundle.transposed ? static_cast<size_t>(c) * padded + r
-                                                 : static_cast<size_t>(r) * padded + c];
+    const double cell = std::hypot(step_x * grid.pitch_x, step_y * grid.pitch_y);
+    auto place = [&](const std::vector<float>& from, float unit, float* to) {
+        for (int r = 0; r < rect.height; ++r)
+            for (int c = 0; c < rect.width; ++c)
+                to[static_cast<size_t>(r) * rect.width + c] =
+                    unit * from[bundle.transposed ? static_cast<size_t>(c) * padded + r
+                                                  : static_cast<size_t>(r) * padded + c];
+    };
+    place(slope, static_cast<float>(grid.pitch_x / cell), horizon_slope);
+    if (horizon_distance) place(travel, static_cast<float>(cell), horizon_distance);
 }
 
 const char* simd_target() {

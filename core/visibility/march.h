@@ -37,9 +37,10 @@ void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int 
 // Horizon of every cell of the rectangle along the bundle's horizontal direction (its rise is not used):
 // largest (height of the relief - height of the start) / horizontal travel over the break points of the
 // profile, which is exact for the mesh; never below 0. slope is metric (tan of the elevation). slope[row *
-// width + column] in untransposed cells.
-void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect,
-                   float* horizon_slope);
+// width + column] in untransposed cells. distance: horizontal, metres, to the break point that is the
+// horizon, 0 where none stands higher than the start; left out if null.
+void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, float* horizon_slope,
+                   float* horizon_distance = nullptr);
 
 // "AVX3", "AVX2", "SSE4", ...: the kernels that run on this machine.
 const char* simd_target();

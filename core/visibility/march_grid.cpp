@@ -8,8 +8,9 @@
 namespace gonio {
 namespace {
 
-// A block starts at a column below nx and reads march_block + 1 nodes from there.
-constexpr int padding = march_block + 8;
+// A block starts at a column below nx and reads march_block + 1 nodes from there; the lines of the horizon
+// sweep go in blocks of up to 2 march_block.
+constexpr int padding = 2 * march_block + 8;
 
 std::vector<float> pad(const std::vector<float>& nodes, int nx, int ny, int stride) {
     std::vector<float> padded(static_cast<size_t>(ny + 2) * stride);

@@ -30,6 +30,7 @@ struct ScalarHit {
     double travel = 0;                  // cells
     double clearance = 1e300;           // smallest |ray - relief| over the edges that it passes, cells
     double horizon = 0;                 // largest rise per cell of travel over the edges, at least 0
+    double horizon_travel = 0;          // cells to the edge where it is
 };
 
 // Works in cells along x and y and pitch_x along z.
@@ -76,7 +77,10 @@ class ScalarMarch {
                 const int kind = origin.x + d.x * middle - cell_x >= origin.y + d.y * middle - cell_y ? 0 : 1;
                 const double x = origin.x + d.x * to, y = origin.y + d.y * to;
                 const double edge = relief(kind, cell_x, cell_y, x, y);
-                result.horizon = std::max(result.horizon, (edge - origin.z) / to);
+                if ((edge - origin.z) / to > result.horizon) {
+                    result.horizon = (edge - origin.z) / to;
+                    result.horizon_travel = to;
+                }
                 const bool own = first && kind == start.kind;
                 if (!own) result.clearance = std::min(result.clearance, std::abs(origin.z + d.z * to - edge));
                 if (own || only_horizon) continue;
@@ -356,16 +360,21 @@ TEST(March, HorizonEqualsScalarWalk) {
             for (const FacetPoint& start : several_points()) {
                 const Vec3 d = direction(0, phi_deg);
                 const RayBundle bundle = make_ray_bundle(grid, d, start, far);
-                std::vector<float> slope(static_cast<size_t>(rect.width) * rect.height);
-                march_horizon(grid, bundle, rect, slope.data());
+                std::vector<float> slope(static_cast<size_t>(rect.width) * rect.height), distance(slope);
+                march_horizon(grid, bundle, rect, slope.data(), distance.data());
                 // A cell of travel along d, in pitch_x.
                 const double cell = 1 / std::hypot(d.x, d.y / pitch_y);
                 for (int r = 0; r < rect.height; ++r)
                     for (int c = 0; c < rect.width; ++c) {
                         const ScalarHit expected =
                             scalar.trace(rect.x0 + c, rect.y0 + r, start, d, far, true);
-                        ASSERT_NEAR(slope[static_cast<size_t>(r) * rect.width + c], expected.horizon / cell,
-                                    1e-5 * (1 + expected.horizon / cell));
+                        const size_t at = static_cast<size_t>(r) * rect.width + c;
+                        ASSERT_NEAR(slope[at], expected.horizon / cell, 1e-5 * (1 + expected.horizon / cell));
+                        // Where a row is all there is, both facets of a cell are one plane: edges tie.
+                        if (nx > 1 && ny > 1) {
+                            ASSERT_NEAR(distance[at], expected.horizon_travel * cell,
+                                        1e-4 * (1 + expected.horizon_travel * cell));
+                        }
                     }
             }
     }
