@@ -37,6 +37,7 @@ json canonical(const BrdfPlan& plan) {
            {"orders", plan.separate_orders ? "separate" : "sum"},
            {"accuracy", canonical(plan.accuracy)}};
     if (!plan.pairs.empty()) j["pairs"] = plan.pairs;
+    if (plan.transport != TransportKind::automatic) j["transport"] = static_cast<int>(plan.transport);
     return j;
 }
 

@@ -16,10 +16,17 @@ int parse_max_order(const JsonNode& node) {
     return static_cast<int>(node.whole_number(1, max_orders));
 }
 
+TransportKind parse_transport(const JsonNode& node) {
+    const std::string name = node.choice({"auto", "diffuse", "pair_graph", "forward"});
+    if (name == "diffuse") return TransportKind::diffuse;
+    if (name == "pair_graph") return TransportKind::pair_graph;
+    return name == "forward" ? TransportKind::forward : TransportKind::automatic;
+}
+
 }  // namespace
 
 BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
-    measure.allow_keys({"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders"});
+    measure.allow_keys({"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders", "transport"});
     BrdfPlan plan;
     parse_direction_pairs(measure, plan);
     if (const size_t rows = plan.incident.size() * plan.outgoing.size();
@@ -30,6 +37,7 @@ BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
     if (const auto order = measure.find("max_order")) plan.max_order = parse_max_order(*order);
     if (const auto orders = measure.find("orders"))
         plan.separate_orders = orders->choice({"sum", "separate"}) == "separate";
+    if (const auto transport = measure.find("transport")) plan.transport = parse_transport(*transport);
     plan.accuracy = accuracy;
     return plan;
 }

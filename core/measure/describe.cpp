@@ -24,7 +24,7 @@ std::string mesh_bias_in_words(const MeshBias& mesh_bias) {
 }
 
 double noise_correction_percent(const RunContext& context, const Stage& stage) {
-    const Parameter& albedo = context.material->albedo;
+    const Parameter& albedo = context.lambertian->albedo;
     const double largest = albedo.is_map() ? 1.0 : albedo.range().second;
     return stage.noise ? -100 * stage.noise->kappa * std::pow(largest, 2) : 0.0;
 }
@@ -51,19 +51,20 @@ void describe_runs(const RunContext& context, const std::vector<Stage>& stages, 
     const Stage& last = stages.back();
     int runs = 0;
     for (const Stage& s : stages) runs += s.f.count();
-    report.settings = {{"transport", "diffuse operator"},
-                       {"simd", simd_target()},
-                       {"sub_samples", std::to_string(last.settings.sub_samples)},
-                       {"directions", std::to_string(last.settings.directions)},
-                       {"refinement", std::to_string(last.settings.refinement)},
-                       {"applications", std::to_string(totals.applications)},
-                       {"windows", windows(last.settings)},
-                       {"runs", std::to_string(last.f.count()) + " (" + std::to_string(runs) + " in " +
-                                    std::to_string(stages.size()) + " stages)"},
-                       {"mesh_bias", mesh_bias_in_words(mesh_bias)},
-                       {"noise_bias", "corrected by " + number(noise_correction_percent(context, last)) +
-                                          " % of the direct part"},
-                       {"relative_error", number(report.relative_error)}};
+    const std::vector<std::pair<std::string, std::string>> settings = {
+        {"simd", simd_target()},
+        {"sub_samples", std::to_string(last.settings.sub_samples)},
+        {"directions", std::to_string(last.settings.directions)},
+        {"refinement", std::to_string(last.settings.refinement)},
+        {"applications", std::to_string(totals.applications)},
+        {"windows", windows(last.settings)},
+        {"runs", std::to_string(last.f.count()) + " (" + std::to_string(runs) + " in " +
+                     std::to_string(stages.size()) + " stages)"},
+        {"mesh_bias", mesh_bias_in_words(mesh_bias)},
+        {"noise_bias",
+         "corrected by " + number(noise_correction_percent(context, last)) + " % of the direct part"},
+        {"relative_error", number(report.relative_error)}};
+    report.settings.insert(report.settings.end(), settings.begin(), settings.end());
     report.counters = {{"rays", totals.rays},
                        {"rays skipped (steeper than the relief)", totals.rays_skipped},
                        {"links", totals.links},

@@ -18,14 +18,14 @@ double direct_part(const RunContext& context, const Stage& stage, size_t channel
     const size_t rows = context.rows();
     if (slices > 1) return f[(channel * slices + 1) * rows + row];
     const double direct = stage.direct.mean()[row];
-    const Parameter& albedo = context.material->albedo;
+    const Parameter& albedo = context.lambertian->albedo;
     if (!albedo.is_map()) return direct * albedo.constant[channel];
     return channel == 0 ? direct : f[row] > 0 ? direct / f[row] * f[channel * rows + row] : 0.0;
 }
 
 // What multiplies K at each order.
 double albedo_of(const RunContext& context, size_t channel) {
-    const Parameter& albedo = context.material->albedo;
+    const Parameter& albedo = context.lambertian->albedo;
     return albedo.is_map() ? 1.0 : albedo.constant[channel];
 }
 
@@ -109,9 +109,9 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
         for (size_t c = 0; c < n_channels; ++c) {
             for (size_t slice = 0; slice < slices; ++slice) {
                 const MeshShare mesh =
-                    slice >= 2
-                        ? mesh_bias.share_of_order(static_cast<int>(slice))
-                        : mesh_bias.share_of_sum(mean_albedo(context.material->albedo, c), context.max_order);
+                    slice >= 2 ? mesh_bias.share_of_order(static_cast<int>(slice))
+                               : mesh_bias.share_of_sum(mean_albedo(context.lambertian->albedo, c),
+                                                        context.max_order);
                 for (size_t r = 0; r < rows; ++r) {
                     const size_t i = (c * slices + slice) * rows + r;
                     const double f = stage.f.mean()[i], direct = direct_part(context, stage, c, slices, r);
@@ -153,7 +153,7 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
             }
 
     double random = 0, systematic = 0, direct = 0;
-    const Parameter& albedo = context.material->albedo;
+    const Parameter& albedo = context.lambertian->albedo;
     const std::vector<double>& values = albedo.constant;
     const size_t brightest =
         albedo.is_map()

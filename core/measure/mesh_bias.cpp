@@ -230,7 +230,7 @@ MeshBias measure_mesh_bias(const RunContext& context, const RunSettings& setting
     const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
     const Irradiance irradiance = compute_irradiance(
         *context.grid, tile, probes, two_sided ? context.views : probes, !two_sided,
-        shifted_sub_samples(n_places, 0.6, 0.3), {}, context.skip_steep, n_threads, monitor);
+        shifted_sub_samples(n_places, 0.6, 0.3), {}, context.allow_skips, n_threads, monitor);
     auto half_of_the_directions = [&](double shift) {
         return build_link_operator(*context.grid, tile,
                                    slab_directions(n_directions / 2, z_max, 0.5, 0.25 + shift),

@@ -50,7 +50,7 @@ NoiseBias measure_noise_bias(const RunContext& context, const RunSettings& setti
     const std::vector<Vec3> directions = probe_directions(context);
     const Irradiance irradiance =
         compute_irradiance(*context.grid, tile, directions, directions, true, {{0.6, 0.3}}, {},
-                           context.skip_steep, n_threads, monitor);
+                           context.allow_skips, n_threads, monitor);
     const double z_max =
         context.grid->max_slope / std::sqrt(1 + context.grid->max_slope * context.grid->max_slope);
     std::vector<Fields> first;

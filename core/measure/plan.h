@@ -33,11 +33,15 @@ struct Accuracy {
     }
 };
 
+// Who carries the light; `automatic` leaves it to the material and the error that each would leave.
+enum class TransportKind { automatic, diffuse, pair_graph, forward };
+
 struct BrdfPlan {
     std::vector<AnglesDeg> incident, outgoing;  // as in Table
     std::vector<std::pair<int, int>> pairs;     // as in Table: empty for the full product
     int max_order = 0;                          // 0: all orders; K: orders 1..K only
     bool separate_orders = false;               // K slices of single orders beside the sum
+    TransportKind transport = TransportKind::automatic;
     Accuracy accuracy;
 };
 

@@ -61,10 +61,11 @@ Prediction predict_brdf(const HeightField& surface, const Material& material, co
                         long long max_bytes) {
     RunContext context;
     context.surface = &surface;
+    context.material = &material;
     context.plan = &plan;
     const Lambertian gray{Parameter(0.5).for_channels(material.channels.size())},
         *lambertian = pure_lambertian(material);
-    context.material = lambertian ? lambertian : &gray;
+    context.lambertian = lambertian ? lambertian : &gray;
     const double cells = static_cast<double>(surface.nx) * surface.ny,
                  window_cells = std::pow(tile_core + 2.0 * tile_halo, 2),
                  directions = distinct_directions(plan), target = plan.accuracy.target();

@@ -105,7 +105,7 @@ std::vector<Block> make_blocks(const RunContext& context, const RunSettings& set
 
 std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& tile) {
     std::vector<ChannelFactors> factors;
-    const Parameter& albedo = context.material->albedo;
+    const Parameter& albedo = context.lambertian->albedo;
     if (!albedo.is_map()) return factors;
     for (size_t c = 0; c < context.n_channels(); ++c) {
         ChannelFactors f(tile.n_slots(), 0.0f);
@@ -163,13 +163,13 @@ struct Sums {
 void write_rows(const RunContext& context, const Block& block, const Sums& sums, size_t slices,
                 RunValues& values) {
     const size_t n_rows = context.rows(), n_channels = context.n_channels();
-    const bool map = context.material->albedo.is_map(),
+    const bool map = context.lambertian->albedo.is_map(),
                open = context.surface->border_x > 0 || context.surface->border_y > 0;
     auto view_of = [&](const Block::Row& row) {
         return block.same ? context.lights[block.lights[row.view]] : context.views[block.views[row.view]];
     };
     for (size_t c = 0; c < n_channels; ++c) {
-        const double albedo = map ? 1.0 : context.material->albedo.constant[c];
+        const double albedo = map ? 1.0 : context.lambertian->albedo.constant[c];
         const Matrix& direct = sums.direct[map ? c : 0];
         const std::vector<Matrix>& orders = sums.orders[map ? c : 0];
         for (const Block::Row& row : block.rows) {
@@ -216,7 +216,7 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
     // Irradiance, carried orders (three at once is typical), a second copy with several sub-samples or a map;
     // sums in double.
     const double copies = 4.0 + (settings.sub_samples > 1 ? 1 : 0) +
-                          (context.material->albedo.is_map() ? 1 : 0) +
+                          (context.lambertian->albedo.is_map() ? 1 : 0) +
                           (context.keep_orders || context.n_channels() > 1 ? 4 : 0);
     const double sums = static_cast<double>(padded(n_lights)) *
                         padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
@@ -232,7 +232,7 @@ std::string settings_key(const RunContext& context, const RunSettings& settings)
                               static_cast<double>(settings.tiles_x),
                               static_cast<double>(settings.tiles_y),
                               static_cast<double>(context.indirect),
-                              static_cast<double>(context.skip_steep),
+                              static_cast<double>(context.allow_skips),
                               static_cast<double>(context.keep_orders),
                               static_cast<double>(!context.view_to_light.empty()),
                               static_cast<double>(context.fixed_applications),
@@ -272,13 +272,13 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
             double clock = cpu_seconds();
             Irradiance irradiance =
                 compute_irradiance(*context.grid, tile, lights, views, block.same, sub_samples, factors,
-                                   context.skip_steep, n_threads, monitor);
+                                   context.allow_skips, n_threads, monitor);
             values.rays += irradiance.rays;
             values.rays_skipped += irradiance.rays_skipped;
             values.truncated_bundles += irradiance.truncated_bundles;
             values.seconds_direct += cpu_seconds() - clock;
             std::vector<OrderSeries> series;
-            if (context.indirect && context.max_order != 1) {
+            if (context.transports()) {
                 clock = cpu_seconds();
                 const LinkOperator op =
                     build_link_operator(*context.grid, tile, set, jitter, n_threads, monitor);
@@ -297,7 +297,8 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     options.fixed_applications = values.applications;
                 options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
                 options.keep_orders = context.keep_orders;
-                if (!context.material->albedo.is_map()) options.albedos = context.material->albedo.constant;
+                if (!context.lambertian->albedo.is_map())
+                    options.albedos = context.lambertian->albedo.constant;
                 const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),
                              base_views = factors.size() > 1 ? irradiance.views : Fields();
                 for (size_t c = 0; c < std::max<size_t>(1, factors.size()); ++c) {

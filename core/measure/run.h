@@ -7,23 +7,16 @@
 #include "base/monitor.h"
 #include "material/material.h"
 #include "measure/plan.h"
+#include "measure/scene.h"
 #include "scattering/diffuse.h"
 #include "scattering/irradiance.h"
 
 namespace gonio {
 
-// What the runs of one job share.
-struct RunContext {
-    const HeightField* surface = nullptr;
-    const MarchGrid* grid = nullptr;
-    const Lambertian* material = nullptr;  // its albedo with a value or a plane for each channel
-    const BrdfPlan* plan = nullptr;
-    std::vector<Vec3> lights, views;  // of plan->incident and plan->outgoing
-    // views[v] == lights[view_to_light[v]] for all v, and every light is a view: half the work. Empty
-    // otherwise.
-    std::vector<int> view_to_light;
-    bool indirect = true;  // false: black, or too gentle for light to be scattered twice
-    bool skip_steep = true;
+// What the runs of a job by the diffuse operator share.
+struct RunContext : MeasuredScene {
+    const Lambertian* lambertian = nullptr;  // its albedo with a value or a plane for each channel
+    bool indirect = true;                    // false: black, or too gentle for light to be scattered twice
     bool keep_orders = false;  // single orders are wanted, or summing them first is not to be tried
     int max_order = 0;
     double series_tolerance = 1e-4;
@@ -31,10 +24,8 @@ struct RunContext {
     int single_orders =
         0;  // slices of single orders to keep; 0: as many as the series gives, if the table wants them
     bool keep_first = false;  // RunValues::first, for the noise bias
-    long long max_bytes = 0;  // for one run
 
-    size_t rows() const { return plan->pairs.empty() ? lights.size() * views.size() : plan->pairs.size(); }
-    size_t n_channels() const { return material->albedo.n_channels(); }
+    bool transports() const { return indirect && max_order != 1; }
 };
 
 struct RunSettings {

@@ -1,6 +1,9 @@
 #include "measure/simplify.h"
 
 #include <algorithm>
+#include <variant>
+
+#include "material/lobe_parameters.h"
 
 namespace gonio {
 namespace {
@@ -32,6 +35,25 @@ HeightField swap_axes(const HeightField& s) {
     return t;
 }
 
+// Of one row or one column: the order of a map's values stays. A lobe that was turned from x towards y is
+// turned from y towards x.
+void swap_axes(Material& material) {
+    auto swap_map = [](Parameter& p) { std::swap(p.map_nx, p.map_ny); };
+    for (WeightedLobe& part : material.lobes) {
+        swap_map(part.weight);
+        std::visit(
+            [&](auto& lobe) {
+                visit_parameters(lobe,
+                                 [&](const char*, Parameter& p, const ParameterRange&) { swap_map(p); });
+            },
+            part.lobe);
+        if (auto* microfacet = std::get_if<Microfacet>(&part.lobe)) {
+            for (double& turn : microfacet->rotation_deg.constant) turn = 90 - turn;
+            for (float& turn : microfacet->rotation_deg.map) turn = 90 - turn;
+        }
+    }
+}
+
 void keep_one_row(HeightField& s) {
     s.heights.resize(s.nx);
     s.ny = 1;
@@ -45,10 +67,25 @@ bool is_plane(const HeightField& surface) {
                        [&](float h) { return h == surface.heights.front(); });
 }
 
-SimplifiedScene simplify_scene(const HeightField& surface, const Lambertian& material, bool allow_skips) {
+bool has_maps(const Material& material) {
+    bool found = false;
+    for (const WeightedLobe& part : material.lobes) {
+        found = found || part.weight.is_map();
+        std::visit(
+            [&](const auto& lobe) {
+                visit_parameters(lobe, [&](const char*, const Parameter& p, const ParameterRange&) {
+                    found = found || p.is_map();
+                });
+            },
+            part.lobe);
+    }
+    return found;
+}
+
+SimplifiedScene simplify_scene(const HeightField& surface, const Material& material, bool allow_skips) {
     SimplifiedScene scene{surface, material, false, {}};
     HeightField& s = scene.surface;
-    if (allow_skips && !material.albedo.is_map()) {
+    if (allow_skips && !has_maps(material)) {
         if (s.ny > 1 && rows_alike(s)) {
             keep_one_row(s);
             scene.skipped.push_back({"all rows but one", "the surface does not change along y"});
@@ -62,10 +99,8 @@ SimplifiedScene simplify_scene(const HeightField& surface, const Lambertian& mat
     if (s.nx == 1 && s.ny > 1) {
         s = swap_axes(s);
         scene.axes_swapped = !scene.axes_swapped;
-        if (material.albedo.is_map())
-            std::swap(scene.material.albedo.map_nx,
-                      scene.material.albedo.map_ny);  // one column: the order of values stays
     }
+    if (scene.axes_swapped) swap_axes(scene.material);
     return scene;
 }
 

@@ -11,15 +11,17 @@ namespace gonio {
 
 struct SimplifiedScene {
     HeightField surface;
-    Lambertian material;
+    Material material;
     bool axes_swapped =
         false;  // x and y exchanged: directions must be, too (an exact symmetry of the triangulation)
     std::vector<std::pair<std::string, std::string>> skipped;
 };
 
+bool has_maps(const Material& material);
+
 // A surface that is invariant along an axis becomes one row; a surface of one column becomes one row by
 // exchanging the axes, so that rays still march 16 at a time. allow_skips = false: only the exchange.
-SimplifiedScene simplify_scene(const HeightField& surface, const Lambertian& material, bool allow_skips);
+SimplifiedScene simplify_scene(const HeightField& surface, const Material& material, bool allow_skips);
 
 // Largest |difference of heights| over the pitch between neighbouring nodes is 0: a plane.
 bool is_plane(const HeightField& surface);

@@ -324,7 +324,9 @@ TEST(JobHash, DoesNotDependOnSpelling) {
     EXPECT_EQ(hash_of(base_document({{"surface", {{"period", "0.002 m"}}}})), hash);
     EXPECT_EQ(hash_of(base_document({{"surface", {{"period", "2000um"}}}})), hash);
     EXPECT_EQ(hash_of(base_document({{"accuracy", {{"target_relative_error", 0.01}, {"seed", 1}}}})), hash);
-    EXPECT_EQ(hash_of(base_document({{"measure", {{"max_order", "all"}, {"orders", "sum"}}}})), hash);
+    EXPECT_EQ(hash_of(base_document(
+                  {{"measure", {{"max_order", "all"}, {"orders", "sum"}, {"transport", "auto"}}}})),
+              hash);
     EXPECT_EQ(hash_of(base_document({{"output", {{{"format", "exr"}, {"path", "elsewhere.exr"}}}}})), hash);
     // Another order of the keys.
     EXPECT_EQ(
@@ -355,6 +357,7 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
              {{"measure",
                {{"outgoing", {{"theta_deg", {60, 0}}}}}}},  // another order of rows is another table
              {{"measure", {{"max_order", 2}}}},
+             {{"measure", {{"transport", "diffuse"}}}},
              {{"measure", {{"orders", "separate"}}}},
              {{"accuracy", {{"seed", 2}}}},
              {{"accuracy", {{"target_relative_error", 0.02}}}},
