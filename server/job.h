@@ -39,10 +39,16 @@ struct GeneratedSurface {
 };
 using SurfaceSource = std::variant<FileSurface, GridSurface, GeneratedSurface>;
 
+// Images registered to the stored surface that a number of the material is read from.
+struct ParameterMap {
+    size_t part = 0;                 // of material.lobes
+    std::string parameter;           // as visit_parameters() calls it, or "weight"
+    std::string field;               // where the document has it
+    std::vector<std::string> paths;  // one, or one a channel
+};
 struct MaterialSource {
-    Material material;  // complete, or with an empty albedo if there is a map
-    // Paths of images registered to the stored surface, one a channel; empty for constant albedo.
-    std::vector<std::string> albedo_maps;
+    Material material;  // complete but for the maps, in whose place stands some number that is allowed
+    std::vector<ParameterMap> maps;
     HeightReader read = read_trusted_heights;
 };
 

@@ -22,10 +22,10 @@ struct LoadedSurface {
 // "/surface".
 LoadedSurface load_surface(const SurfaceSource& source);
 
-// The material with its albedo map, if it has one, read and registered to the surface: the map has the size
-// of the stored surface and goes through the same y_axis, crop, resample and boundary. Integer images are
-// normalised by their largest value, floating-point ones taken as they are. Throws Error under
-// "/material/albedo" for another size or values outside [0, 1].
+// The material with its maps, if it has any, read and registered to the surface: a map has the size of the
+// stored surface and goes through the same y_axis, crop, resample and boundary. Integer images are normalised
+// by their largest value, floating-point ones taken as they are. Throws Error whose field is the map's, under
+// "/material", for another size or values that are not allowed.
 Material load_material(const MaterialSource& material, const SurfaceSource& source,
                        const LoadedSurface& surface);
 

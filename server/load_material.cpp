@@ -2,12 +2,11 @@
 
 #include "base/error.h"
 #include "base/text.h"
+#include "material/lobe_parameters.h"
 #include "server/load_job.h"
 
 namespace gonio {
 namespace {
-
-const char* const field = "/material/albedo";
 
 // The map in the place of the heights: same stored grid, same way to the prepared one, its numbers untouched.
 PrepareOptions registration(const SurfaceSource& source) {
@@ -32,15 +31,17 @@ int mirrored_cell(int k, int n) {
     return k < n ? k : std::max(0, 2 * n - 2 - k);
 }
 
-RawHeights read_albedos(const std::string& path, const HeightReader& read) {
+RawHeights read_numbers(const ParameterMap& map, const std::string& path, const HeightReader& read,
+                        const ParameterRange& range) {
     RawHeights raw = read(path);
     const double scale = raw.integer_max > 0 ? 1 / raw.integer_max : 1;
     for (size_t k = 0; k < raw.values.size(); ++k) {
         raw.values[k] *= scale;
-        if (!(raw.values[k] >= 0 && raw.values[k] <= 1)) {
-            throw Error(ErrorCode::invalid_input, field, number_text(raw.values[k]),
-                        path + ": albedos must lie from 0 to 1; found at column " +
-                            std::to_string(k % raw.nx) + ", row " + std::to_string(k / raw.nx));
+        if (!(raw.values[k] >= range.low && raw.values[k] <= range.high)) {
+            throw Error(ErrorCode::invalid_input, map.field, number_text(raw.values[k]),
+                        path + ": must lie from " + number_text(range.low) + " to " +
+                            number_text(range.high) + "; found at column " + std::to_string(k % raw.nx) +
+                            ", row " + std::to_string(k / raw.nx));
         }
     }
     raw.bits = 0, raw.integer_max = 0;
@@ -48,40 +49,67 @@ RawHeights read_albedos(const std::string& path, const HeightReader& read) {
     return raw;
 }
 
-// One channel's map, appended to the channels before it.
-void load_map(RawHeights raw, const std::string& path, const SurfaceSource& source,
-              const LoadedSurface& loaded, Parameter& albedo) {
-    const int nx = loaded.stored_nx ? loaded.stored_nx : loaded.surface.nx;
-    const int ny = loaded.stored_ny ? loaded.stored_ny : loaded.surface.ny;
-    if (raw.nx != nx || raw.ny != ny) {
-        throw Error(ErrorCode::invalid_input, field, std::to_string(raw.nx) + " x " + std::to_string(raw.ny),
-                    path + ": the map must have the size of the surface, " + std::to_string(nx) + " x " +
-                        std::to_string(ny));
+class MapLoader {
+  public:
+    MapLoader(const HeightReader& read, const SurfaceSource& source, const LoadedSurface& loaded)
+        : read_(read), source_(source), loaded_(loaded) {}
+
+    Parameter load(const ParameterMap& map, const ParameterRange& range) const {
+        Parameter parameter;
+        for (const std::string& path : map.paths) append(map, path, range, parameter);
+        return parameter;
     }
-    const HeightField map = prepare_surface(std::move(raw), registration(source)).surface;
-    albedo.map_nx = loaded.surface.nx, albedo.map_ny = loaded.surface.ny;
-    albedo.map.reserve(albedo.map.size() + loaded.surface.heights.size());
-    for (int j = 0; j < albedo.map_ny; ++j) {
-        for (int i = 0; i < albedo.map_nx; ++i) {
-            const float above_mean = map.at(mirrored_cell(i, map.nx), mirrored_cell(j, map.ny));
-            albedo.map.push_back(static_cast<float>(std::clamp(above_mean + map.mean_height, 0.0, 1.0)));
+
+  private:
+    // One channel, behind those before it.
+    void append(const ParameterMap& from, const std::string& path, const ParameterRange& range,
+                Parameter& parameter) const {
+        const HeightField& surface = loaded_.surface;
+        const int nx = loaded_.stored_nx ? loaded_.stored_nx : surface.nx;
+        const int ny = loaded_.stored_ny ? loaded_.stored_ny : surface.ny;
+        RawHeights raw = read_numbers(from, path, read_, range);
+        if (raw.nx != nx || raw.ny != ny) {
+            throw Error(ErrorCode::invalid_input, from.field,
+                        std::to_string(raw.nx) + " x " + std::to_string(raw.ny),
+                        path + ": the map must have the size of the surface, " + std::to_string(nx) + " x " +
+                            std::to_string(ny));
         }
+        const HeightField map = prepare_surface(std::move(raw), registration(source_)).surface;
+        parameter.map_nx = surface.nx, parameter.map_ny = surface.ny;
+        parameter.map.reserve(parameter.map.size() + surface.heights.size());
+        for (int j = 0; j < surface.ny; ++j)
+            for (int i = 0; i < surface.nx; ++i) {
+                const float above_mean = map.at(mirrored_cell(i, map.nx), mirrored_cell(j, map.ny));
+                parameter.map.push_back(
+                    static_cast<float>(std::clamp(above_mean + map.mean_height, range.low, range.high)));
+            }
     }
-}
+
+    const HeightReader& read_;
+    const SurfaceSource& source_;
+    const LoadedSurface& loaded_;
+};
 
 }  // namespace
 
 Material load_material(const MaterialSource& source, const SurfaceSource& surface_source,
                        const LoadedSurface& surface) {
     Material material = source.material;
-    if (!source.albedo_maps.empty()) {
-        Parameter albedo;
-        for (const std::string& path : source.albedo_maps)
-            load_map(read_albedos(path, source.read), path, surface_source, surface, albedo);
-        material.lobes = {{1.0, Lambertian{std::move(albedo)}}};
+    const MapLoader loader(source.read, surface_source, surface);
+    for (const ParameterMap& map : source.maps) {
+        WeightedLobe& part = material.lobes[map.part];
+        if (map.parameter == "weight") part.weight = loader.load(map, share_range);
+        std::visit(
+            [&](auto& lobe) {
+                visit_parameters(lobe,
+                                 [&](const char* name, Parameter& parameter, const ParameterRange& range) {
+                                     if (name == map.parameter) parameter = loader.load(map, range);
+                                 });
+            },
+            part.lobe);
     }
     validate(material, surface.surface.nx, surface.surface.ny);
-    return material;
+    return simplified(std::move(material));
 }
 
 }  // namespace gonio

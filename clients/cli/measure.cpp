@@ -13,7 +13,7 @@ namespace {
 
 struct MeasureCommand {
     JobFlags flags;
-    std::string albedo = "0.5", incident, outgoing;
+    std::string albedo = "0.5", material, incident, outgoing;
     std::vector<std::string> outputs;
     bool print_job = false;
 };
@@ -23,6 +23,13 @@ JobEntry albedo_entry(const std::string& text) {
     const bool is_numeric = text.find_first_not_of("0123456789.,eE+- ") == std::string::npos;
     if (!is_numeric) return {"/material/albedo/file", text};
     return {"/material/albedo", text.find(',') == std::string::npos ? text : "[" + text + "]", true};
+}
+
+// A JSON object as in the job document, or a file with one.
+JobEntry material_entry(const std::string& text) {
+    if (text.find_first_not_of(" \t\n") != std::string::npos && text[text.find_first_not_of(" \t\n")] == '{')
+        return {"/material", text, true};
+    return {"/material", read_text(text), true};
 }
 
 // "klems", "hemisphere:64", or a JSON object as in the job document.
@@ -64,8 +71,12 @@ std::string default_name(const std::vector<JobEntry>& entries) {
 
 std::string compose(const MeasureCommand& command) {
     std::vector<JobEntry> entries = command.flags.entries();
-    entries.push_back({"/material/model", "lambertian"});
-    entries.push_back(albedo_entry(command.albedo));
+    if (command.material.empty()) {
+        entries.push_back({"/material/model", "lambertian"});
+        entries.push_back(albedo_entry(command.albedo));
+    } else {
+        entries.push_back(material_entry(command.material));
+    }
     entries.push_back({"/measure/kind", "brdf"});
     add_side(entries, "/measure/incident", command.incident, "[0, 15, 30, 45, 60, 75]", "[0]");
     add_side(entries, "/measure/outgoing", command.outgoing, "[0, 10, 20, 30, 40, 50, 60, 70, 80]",
@@ -130,13 +141,19 @@ void add_measure(CLI::App& app, CommonOptions& common, Action& action) {
         "lava.csv\n"
         "  gonio measure scan.gsf --level plane --boundary open -o scan.csv -o scan.exr\n"
         "  gonio measure --generate v_groove --samples 128 --period 2mm --slope-deg 45 --albedo 0.8,0.5,0.3\n"
+        "  gonio measure lava.png --width 50mm --height-range 5mm "
+        "--material '{\"model\": \"ggx\", \"alpha\": 0.3, \"metal\": \"Cu\"}'\n"
         "  gonio measure lava.png --width 50mm --height-range 5mm --incident klems --outgoing klems\n"
         "  gonio measure lava.png --width 50mm --height-range 5mm --print-job > lava.json   # then: gonio "
         "run lava.json");
     const auto command = std::make_shared<MeasureCommand>();
     add_surface_flags(*sub, command->flags);
-    sub->add_option("--albedo", command->albedo, "0.8, or R,G,B, or an image of the surface's size")
-        ->capture_default_str();
+    CLI::Option* albedo =
+        sub->add_option("--albedo", command->albedo, "0.8, or R,G,B, or an image of the surface's size");
+    albedo->capture_default_str();
+    sub->add_option("--material", command->material,
+                    "Other facets than Lambertian: JSON as in the job document, or a file with it")
+        ->excludes(albedo);
     sub->add_option("--incident", command->incident, "klems, hemisphere:N or JSON, instead of a grid")
         ->group("Directions (degrees)");
     sub->add_option("--outgoing", command->outgoing, "The same for the viewing side")

@@ -16,8 +16,10 @@ namespace {
 
 using nlohmann::json;
 
-// {"file": path} becomes {"sha256": ...} of what was uploaded.
+// {"file": path} becomes {"sha256": ...} of what was uploaded, here and further inside.
 void upload_files(RemoteService& service, json& holder, const std::filesystem::path& folder) {
+    if (holder.is_structured())
+        for (json& member : holder) upload_files(service, member, folder);
     if (!holder.is_object()) return;
     auto uploaded = [&](const json& name) {
         return service.upload((folder / name.get<std::string>()).string());
@@ -50,7 +52,7 @@ SubmittedJob submit_job(RemoteService& service, const std::string& path) {
     json inputs = parse_json_strictly(text);
     inputs.erase("output");
     upload_files(service, inputs["surface"], folder);
-    upload_files(service, inputs["material"]["albedo"], folder);
+    upload_files(service, inputs["material"], folder);
     submitted.info = service.submit(inputs["measure"].value("kind", "brdf"), inputs);
     return submitted;
 }

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "directions/direction.h"
+#include "material/local_frame.h"
 #include "material/material.h"
 #include "surface/height_field.h"
 
@@ -17,7 +18,7 @@ class FacetBrdf {
     // turns towards what stands above (0, 1); the bitangent is n x t.
     FacetBrdf(const Material& material, const HeightField& surface, int kind, int i, int j);
 
-    const Vec3& normal() const { return normal_; }
+    const Vec3& normal() const { return frame_.normal; }
 
     // f_micro(wi, wo) in 1/sr for each channel; world directions, 0 unless both are above the facet. What has
     // no density (mirrors) is left out.
@@ -39,8 +40,13 @@ class FacetBrdf {
     bool has_density() const;
 
   private:
+    LocalFrame frame_of(const Lobe& lobe) const;
+    double odds(size_t k, double cos_o) const;
+    double sum_of_odds(double cos_o) const;
+
     const Material& material_;
-    Vec3 normal_;
+    Gradient gradient_;
+    LocalFrame frame_;  // without rotation
     int i_, j_;
 };
 

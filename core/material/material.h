@@ -74,6 +74,10 @@ struct Material {
 // else null. Mixtures of Lambertians are so after simplified().
 const Lambertian* pure_lambertian(const Material& material);
 
+// The same material in fewest lobes: one for all Lambertian parts, of weight 1 if there are no others;
+// none of weight 0.
+Material simplified(Material material);
+
 // Throws Error("/material/...") for values that are not allowed, for numbers of channels that do not fit, or
 // a map of another size than nx x ny.
 void validate(const Material& material, int nx, int ny);

@@ -28,6 +28,18 @@ class Resolver {
         for (size_t k = 0; k < named->array_size(); ++k) list.push_back(path_of(named->element(k)));
     }
 
+    // Of every object inside: any number of a material may be a map.
+    void resolve_all(const JsonNode& node, json& value) const {
+        if (node.raw().is_object()) {
+            for (const auto& [key, unused] : node.raw().items()) resolve_all(node.at(key), value[key]);
+            resolve(node, value);
+        } else if (node.raw().is_array()) {
+            // Numbers name nothing: of a long list of them not one path is made.
+            for (size_t k = 0; k < node.raw().size(); ++k)
+                if (node.raw()[k].is_structured()) resolve_all(node.element(k), value[k]);
+        }
+    }
+
   private:
     std::string path_of(const JsonNode& named) const {
         const std::string sha256 = named.text();
@@ -48,9 +60,8 @@ UploadedFiles resolve_uploads(const json& document, const Objects& objects) {
     const JsonNode root(document);
     if (const auto surface = root.find("surface"); surface && surface->raw().is_object())
         resolver.resolve(*surface, files.document["surface"]);
-    if (const auto material = root.find("material"); material && material->raw().is_object())
-        if (const auto albedo = material->find("albedo"); albedo && albedo->raw().is_object())
-            resolver.resolve(*albedo, files.document["material"]["albedo"]);
+    if (const auto material = root.find("material"))
+        resolver.resolve_all(*material, files.document["material"]);
     return files;
 }
 

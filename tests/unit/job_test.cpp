@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -519,6 +520,47 @@ TEST_F(AlbedoMap, HasAFileForEachChannel) {
     EXPECT_THROW(loaded({{"wavelengths_nm", {450, 600}}, {"files", {"map.txt"}}}), Error);
 }
 
+// Any number of a material may be a map; "alpha" is two of them, a weight one, and the range is that of the
+// number.
+TEST_F(AlbedoMap, OfEveryParameter) {
+    std::ofstream(folder_ / "exponents.txt") << "0 1 20\n300 4000 5\n";
+    std::ofstream(folder_ / "alphas.txt") << "1 0.1 0.2\n0.3 0.4 0.5\n";
+    const auto loaded = [&](const json& material) {
+        json document = base_document(json::object());
+        document["material"] = material;
+        document["surface"] = {{"grid", {{0, 1, 2}, {3, 4, 5}}}, {"pitch", "1 mm"}, {"height_scale", "1 um"}};
+        return load_job(parse_job(document.dump(), {"x", folder_.string()})).material;
+    };
+    const json file = {{"file", "map.txt"}}, exponents = {{"file", "exponents.txt"}},
+               alphas = {{"file", "alphas.txt"}};
+    const Material phong = loaded({{"model", "phong"}, {"exponent", exponents}, {"albedo", file}});
+    expect_map(std::get<Phong>(phong.lobes[0].lobe).albedo, {0, 0.1, 0.2, 0.3, 0.4, 0.5});
+    EXPECT_NEAR(std::get<Phong>(phong.lobes[0].lobe).exponent.at(0, 1, 1), 4000, 1e-3);
+
+    const json ggx_part = {{"weight", 0.5},
+                           {"model", "ggx"},
+                           {"alpha", alphas},
+                           {"eta", alphas},
+                           {"k", {3, 2, 1}}},
+               mirror_part = {{"weight", file}, {"model", "mirror"}, {"reflectance", 1}};
+    const Material mixture = loaded({{"model", "mixture"}, {"parts", json::array({ggx_part, mirror_part})}});
+    const auto& ggx = std::get<Microfacet>(mixture.lobes[0].lobe);
+    expect_map(ggx.alpha_x, {1, 0.1, 0.2, 0.3, 0.4, 0.5});
+    expect_map(ggx.alpha_y, {1, 0.1, 0.2, 0.3, 0.4, 0.5});
+    expect_map(ggx.reflectance.eta, {1, 0.1, 0.2, 0.3, 0.4, 0.5});
+    expect_map(mixture.lobes[1].weight, {0, 0.1, 0.2, 0.3, 0.4, 0.5});
+    EXPECT_EQ(mixture.channels.size(), 3u);
+
+    const Error range = error_of([&] { loaded({{"model", "ggx"}, {"alpha", file}, {"reflectance", 1}}); });
+    EXPECT_EQ(range.field(), "/material/alpha");
+    EXPECT_EQ(range.value(), "0");
+    const json heavy = {{"weight", 0.6}, {"model", "phong"}, {"exponent", 2}, {"albedo", 1}};
+    EXPECT_EQ(error_of([&] {
+                  loaded({{"model", "mixture"}, {"parts", json::array({heavy, mirror_part})}});
+              }).field(),
+              "/material/parts");
+}
+
 TEST_F(AlbedoMap, ChangesTheHashOfTheJob) {
     const auto hash = [&] {
         json document = base_document({{"material", {{"albedo", {{"file", "map.txt"}}}}}});
@@ -539,6 +581,54 @@ TEST_F(AlbedoMap, OfAnotherSizeOrRangeIsRefused) {
     const Error range = error_of([&] { load(json::object(), "bright.txt"); });
     EXPECT_EQ(range.value(), "1.5");
     EXPECT_NE(std::string(range.what()).find("column 2, row 1"), std::string::npos);
+}
+
+// ---- materials
+
+TEST(MaterialJob, MetalsHaveTheIndexOfTheirChannels) {
+    const auto material = [](const json& m) {
+        json document = base_document(json::object());
+        document["material"] = m;
+        return parse_job(document.dump(), {}).material.material;
+    };
+    const Material rgb = material({{"model", "mirror"}, {"metal", "Au"}});
+    EXPECT_EQ(rgb.channels, (std::vector<std::string>{"r", "g", "b"}));
+    const auto& index = std::get<Mirror>(rgb.lobes[0].lobe).reflectance;
+    EXPECT_LT(index.eta.at(0, 0, 0), 0.25);
+    EXPECT_GT(index.eta.at(2, 0, 0), 1.2);
+    const json iron_part = {{"weight", 0.5}, {"model", "ggx"}, {"alpha", 0.3}, {"metal", "Fe"}},
+               paint = {{"weight", 0.5},
+                        {"model", "lambertian"},
+                        {"albedo", {{"wavelengths_nm", {549, 704}}, {"values", {0.1, 0.2}}}}};
+    const Material spectrum = material({{"model", "mixture"}, {"parts", json::array({iron_part, paint})}});
+    EXPECT_EQ(spectrum.channels, (std::vector<std::string>{"549nm", "704nm"}));
+    const auto& iron = std::get<Microfacet>(spectrum.lobes[0].lobe).reflectance;
+    EXPECT_NEAR(iron.eta.at(0, 0, 0), 2.95, 1e-9);
+    EXPECT_NEAR(iron.k.at(1, 0, 0), 3.19, 1e-9);
+}
+
+// Every number of a material is in the name of the job; how it is written is not.
+TEST(MaterialJob, HashTellsMaterialsApart) {
+    const auto hash = [](const json& m) {
+        json document = base_document(json::object());
+        document["material"] = m;
+        return load_job(parse_job(document.dump(), {})).hash;
+    };
+    const json ggx = {{"model", "ggx"}, {"alpha", 0.3}, {"reflectance", 1}};
+    std::vector<std::string> names = {hash(ggx)};
+    for (const json& change : {json{{"model", "beckmann"}}, json{{"alpha", 0.31}}, json{{"rotation_deg", 10}},
+                               json{{"reflectance", 0.9}}, json{{"reflectance", nullptr}, {"metal", "Ag"}}}) {
+        json other = ggx;
+        other.merge_patch(change);
+        EXPECT_EQ(std::count(names.begin(), names.end(), hash(other)), 0) << change;
+        names.push_back(hash(other));
+    }
+    const json written_otherwise = {
+        {"model", "ggx"}, {"alpha_x", 0.3}, {"alpha_y", 0.3}, {"rotation_deg", 0}, {"reflectance", 1}};
+    EXPECT_EQ(hash(ggx), hash(written_otherwise));
+    const json half = {{"weight", 0.5}, {"model", "lambertian"}, {"albedo", 0.8}};
+    EXPECT_EQ(hash({{"model", "lambertian"}, {"albedo", 0.8}}),
+              hash({{"model", "mixture"}, {"parts", json::array({half, half})}}));
 }
 
 // ---- outputs

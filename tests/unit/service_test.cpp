@@ -91,6 +91,15 @@ TEST_F(Uploads, AreNamedByHashAndNothingElse) {
     EXPECT_EQ(refusal({{"material", {{"albedo", {{"files", {"/etc/passwd"}}}}}}}), "/material/albedo/files");
     EXPECT_EQ(refusal({{"material", {{"albedo", {{"sha256", {sha256, std::string(64, '0')}}}}}}}),
               "/material/albedo/sha256/1");
+    // Wherever a material may name a file.
+    const nlohmann::json parts = {{{"weight", {{"sha256", sha256}}}, {"alpha", {{"sha256", sha256}}}}};
+    const nlohmann::json mixture =
+        resolve_uploads({{"material", {{"model", "mixture"}, {"parts", parts}}}}, objects_).document;
+    EXPECT_EQ(mixture["material"]["parts"][0]["weight"]["file"], objects_.path(sha256));
+    EXPECT_EQ(mixture["material"]["parts"][0]["alpha"]["file"], objects_.path(sha256));
+    const nlohmann::json stranger = {{{"weight", 1}, {"exponent", {{"file", "/etc/passwd"}}}}};
+    EXPECT_EQ(refusal({{"material", {{"model", "mixture"}, {"parts", stranger}}}}),
+              "/material/parts/0/exponent/file");
 }
 
 // What the decoder of a stranger's file is left with.

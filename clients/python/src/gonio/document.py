@@ -30,11 +30,10 @@ def read_document(job: JobDocument | None, members: Mapping[str, Any]) -> dict[s
     else:
         folder = Path(job).resolve().parent
         document = {**_read_json(Path(job)), **members}
-    for name in ("surface", "material"):
-        if isinstance(document.get(name), Mapping):
-            document[name] = dict(document[name])
-    if isinstance(document.get("material"), dict) and isinstance(document["material"].get("albedo"), Mapping):
-        document["material"]["albedo"] = dict(document["material"]["albedo"])
+    if isinstance(document.get("surface"), Mapping):
+        document["surface"] = dict(document["surface"])
+    if "material" in document:
+        document["material"] = _copied(document["material"])
     for files in file_members(document):
         if isinstance(files.get("file"), (str, os.PathLike)):
             files["file"] = str(folder / files["file"])
@@ -44,10 +43,21 @@ def read_document(job: JobDocument | None, members: Mapping[str, Any]) -> dict[s
 
 
 def file_members(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """The parts of a document that may name files: the surface and the albedo."""
-    material = document.get("material")
-    parts = [document.get("surface"), material.get("albedo") if isinstance(material, dict) else None]
-    return [part for part in parts if isinstance(part, dict)]
+    """The parts of a document that may name files: the surface, and any number of the material."""
+    return [part for part in [document.get("surface"), *_objects(document.get("material"))] if isinstance(part, dict)]
+
+
+def _copied(value: Any) -> Any:
+    """Mappings and lists of them anew, down to what is neither."""
+    if isinstance(value, Mapping):
+        return {key: _copied(member) for key, member in value.items()}
+    return [_copied(member) for member in value] if isinstance(value, (list, tuple)) else value
+
+
+def _objects(value: Any) -> list[dict[str, Any]]:
+    """All mappings inside, itself included."""
+    inside = list(value.values()) if isinstance(value, dict) else value if isinstance(value, list) else []
+    return ([value] if isinstance(value, dict) else []) + [found for member in inside for found in _objects(member)]
 
 
 def document_text(document: Any) -> str:

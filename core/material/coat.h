@@ -1,0 +1,16 @@
+// A rough dielectric interface (GGX) over something else: what passes it. Light that the visible microfacets
+// do not reflect is let through, so lobe and transmitted light never add up to more than arrives.
+#pragma once
+
+namespace gonio {
+
+// Share of the light from a direction cos_theta off the normal that passes: the mean of 1 - F over the
+// normals that the direction sees. eta in [1, 1e6], alpha in (0, 1]. The same for light that leaves
+// (Helmholtz), whatever is below scatters evenly. Out of a table, interpolated: within 0.01 of the mean for
+// eta up to 3, and exact for eta = 1.
+double coat_transmittance(double eta, double alpha, double cos_theta);
+
+// Integral of 2 cos_theta coat_transmittance over cos_theta in [0, 1], of the interpolated values exactly.
+double mean_coat_transmittance(double eta, double alpha);
+
+}  // namespace gonio
