@@ -16,6 +16,7 @@
 
 #include "base/units.h"
 #include "surface/io/formats.h"
+#include "surface/io/radiance_image.h"
 
 namespace gonio {
 namespace {
@@ -154,17 +155,40 @@ void check_header(const FileBytes& file, const Imf::Header& header, bool tiled, 
                "the lines or tiles are too large for a file of this size");
 }
 
-RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
+// Everything that can be wrong before a pixel is decoded.
+Imf::Header checked_part(const FileBytes& file, const ReadLimits& limits, MemoryStream& stream) {
     int version = load<int32_t>(&file.bytes[4], false);
-    if (version & deep_flag) refuse(file, "deep data", "a height map must be flat");
-    if (version & multi_part_flag) refuse(file, "several parts", "a height map must be a single part");
+    if (version & deep_flag) refuse(file, "deep data", "the image must be flat");
+    if (version & multi_part_flag) refuse(file, "several parts", "the image must be a single part");
     check_attributes(file);
-    MemoryStream stream(file);
     stream.seekg(header_start);
     Imf::Header header;
     header.readFrom(stream, version);
     check_header(file, header, version & tiled_flag, limits);
+    return header;
+}
 
+// The named channels as floats, one plane after the other.
+std::vector<float> read_planes(MemoryStream& stream, const Imf::Header& header,
+                               const std::vector<std::string>& names) {
+    const auto& window = header.dataWindow();
+    const size_t width = static_cast<size_t>(window.max.x - window.min.x) + 1,
+                 plane = width * (static_cast<size_t>(window.max.y - window.min.y) + 1);
+    std::vector<float> pixels(names.size() * plane);
+    Imf::FrameBuffer frame;
+    for (size_t c = 0; c < names.size(); ++c)
+        frame.insert(names[c], Imf::Slice::Make(Imf::FLOAT, &pixels[c * plane], window, sizeof(float),
+                                                sizeof(float) * width));
+    stream.seekg(0);
+    Imf::InputFile input(stream, 0);
+    input.setFrameBuffer(frame);
+    input.readPixels(window.min.y, window.max.y);
+    return pixels;
+}
+
+RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
+    MemoryStream stream(file);
+    const Imf::Header header = checked_part(file, limits, stream);
     const auto& window = header.dataWindow();
     RawHeights heights;
     heights.nx = window.max.x - window.min.x + 1, heights.ny = window.max.y - window.min.y + 1;
@@ -175,31 +199,52 @@ RawHeights read_part(const FileBytes& file, const ReadLimits& limits) {
     heights.pitch_x = metres_attribute(file, header, "pixelPitchX_m");
     heights.pitch_y = metres_attribute(file, header, "pixelPitchY_m");
     heights.height_unit = metres_attribute(file, header, "heightUnit_m");
-
-    std::vector<float> pixels(static_cast<size_t>(heights.nx) * heights.ny);
-    Imf::FrameBuffer frame;
-    frame.insert(channel, Imf::Slice::Make(Imf::FLOAT, pixels.data(), window, sizeof(float),
-                                           sizeof(float) * heights.nx));
-    stream.seekg(0);
-    Imf::InputFile input(stream, 0);
-    input.setFrameBuffer(frame);
-    input.readPixels(window.min.y, window.max.y);
+    const std::vector<float> pixels = read_planes(stream, header, {channel});
     heights.values.assign(pixels.begin(), pixels.end());
     return heights;
 }
 
-}  // namespace
+RadianceImage read_radiance_part(const FileBytes& file, const ReadLimits& limits) {
+    MemoryStream stream(file);
+    const Imf::Header header = checked_part(file, limits, stream);
+    const auto& window = header.dataWindow();
+    RadianceImage image;
+    image.nx = window.max.x - window.min.x + 1, image.ny = window.max.y - window.min.y + 1;
+    const Imf::ChannelList& channels = header.channels();
+    std::vector<std::string> names{"R", "G", "B"};
+    if (!channels.findChannel("R") || !channels.findChannel("G") || !channels.findChannel("B")) {
+        if (!channels.findChannel("Y")) refuse(file, "", "needs the channels R, G, B, or Y");
+        names = {"Y"};
+    }
+    for (const std::string& name : names)
+        if (channels[name].xSampling != 1 || channels[name].ySampling != 1)
+            refuse(file, "channel " + name, "must not be sub-sampled");
+    image.n_channels = static_cast<int>(names.size());
+    image.values = read_planes(stream, header, names);
+    return image;
+}
 
-RawHeights read_exr(const FileBytes& file, const ReadLimits& limits) {
+template <class Read>
+auto decode(const FileBytes& file, Read&& read) {
     if (!file.bytes.starts_with(magic) || file.bytes.size() < header_start)
         refuse(file, "", "is not an OpenEXR file: its first bytes are wrong");
     try {
-        return read_part(file, limits);
+        return read();
     } catch (const Error&) {
         throw;
     } catch (const std::exception& failure) {
         refuse(file, "", std::string("damaged OpenEXR: ") + failure.what());
     }
+}
+
+}  // namespace
+
+RawHeights read_exr(const FileBytes& file, const ReadLimits& limits) {
+    return decode(file, [&] { return read_part(file, limits); });
+}
+
+RadianceImage read_exr_radiance(const FileBytes& file, const ReadLimits& limits) {
+    return decode(file, [&] { return read_radiance_part(file, limits); });
 }
 
 }  // namespace gonio

@@ -28,6 +28,9 @@ RawHeights read_text_matrix(const FileBytes& file, const ReadLimits& limits);
 // read_heights after the file is in memory (what the fuzzer feeds).
 RawHeights decode_heights(const FileBytes& file, const ReadLimits& limits);
 
+// A whole file in memory. Throws Error (not_found, io, limit).
+std::string read_bytes(const std::string& path, const ReadLimits& limits);
+
 [[noreturn]] inline void refuse(const FileBytes& file, const std::string& found, const std::string& allowed) {
     throw Error(ErrorCode::invalid_input, file.name, found, allowed);
 }

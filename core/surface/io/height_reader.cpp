@@ -97,7 +97,7 @@ RawHeights decode_heights(const FileBytes& file, const ReadLimits& limits) {
     return heights;
 }
 
-RawHeights read_heights(const std::string& path, const ReadLimits& limits) {
+std::string read_bytes(const std::string& path, const ReadLimits& limits) {
     std::error_code failure;
     if (!std::filesystem::exists(path, failure))
         throw Error(ErrorCode::not_found, path, "", "there is no such file");
@@ -112,7 +112,11 @@ RawHeights read_heights(const std::string& path, const ReadLimits& limits) {
     std::ifstream stream(path, std::ios::binary);
     if (!stream.read(bytes.data(), static_cast<std::streamsize>(size)))
         throw Error(ErrorCode::io, path, "", "cannot be read");
-    return decode_heights({path, bytes}, limits);
+    return bytes;
+}
+
+RawHeights read_heights(const std::string& path, const ReadLimits& limits) {
+    return decode_heights({path, read_bytes(path, limits)}, limits);
 }
 
 }  // namespace gonio
