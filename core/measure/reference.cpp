@@ -36,6 +36,11 @@ std::vector<View> group_by_view(const Table& table) {
     return views;
 }
 
+bool has_mirror(const Material& material) {
+    return std::any_of(material.lobes.begin(), material.lobes.end(),
+                       [](const WeightedLobe& part) { return std::holds_alternative<Mirror>(part.lobe); });
+}
+
 double rms_relative_error(const Table& table) {
     double mean = 0, sum = 0;
     size_t n = 0;
@@ -57,9 +62,10 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
                              const ReferenceOptions& reference, const RunOptions& options,
                              const Monitor& monitor) {
     validate(material, surface.nx, surface.ny);
-    const Lambertian* lambertian = pure_lambertian(material);
-    if (!lambertian)
-        throw Error(ErrorCode::invalid_input, "/material", "", "only Lambertian facets are measured so far");
+    if (has_mirror(material))
+        throw Error(
+            ErrorCode::invalid_input, "/measure/outgoing", "directions",
+            R"(mirrors need receivers of finite size: {"cells": "klems_full"} or {"cells": {"equal": 64}})");
     if (reference.paths < 1)
         throw Error(ErrorCode::invalid_input, "paths", std::to_string(reference.paths), "at least 1");
     if (plan.separate_orders && plan.max_order < 1)
@@ -89,7 +95,7 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
     monitor.report({0, "building the scene", 0});
     const double start = cpu_seconds();
     const PathTracer tracer(
-        surface, *lambertian, static_cast<int>(n_channels),
+        surface, material,
         {reference.paths, plan.max_order, table.orders, plan.accuracy.seed, options.allow_skips});
     const double built = cpu_seconds();
 

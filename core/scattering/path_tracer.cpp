@@ -1,6 +1,7 @@
 #include "scattering/path_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "base/numeric.h"
@@ -43,19 +44,41 @@ RayCounts& RayCounts::operator+=(const RayCounts& other) {
     return *this;
 }
 
+// Where a path meets the relief, and what it carries.
+struct PathTracer::Vertex {
+    int path, order;  // path inside the block; order 1, 2, ...
+    const SceneHit& hit;
+    ScenePoint point;
+    Vec3 wo;                         // where it came from
+    std::span<float> throughput;     // before the vertex
+    std::array<uint32_t, 4> random;  // [2]: Russian roulette
+};
+
 // Every vertex of every path of a block: what the lights see.
 struct PathTracer::Vertices {
     std::vector<ScenePoint> point;
     std::vector<float> nx, ny, nz;  // unit normals, world
-    std::vector<int> path, order;   // path inside the block; order 1, 2, ...
-    std::vector<float> throughput;  // [vertex][channel]
+    std::vector<int> path, order;
+    std::vector<float> throughput;  // [vertex][channel]; of Lambertian facets with the vertex's own albedo
+    std::vector<FacetBrdf> facet;   // unless Lambertian
+    std::vector<Vec3> wo;
+
+    void add(const Vertex& vertex, const Vec3& n) {
+        point.push_back(vertex.point);
+        nx.push_back(static_cast<float>(n.x));
+        ny.push_back(static_cast<float>(n.y));
+        nz.push_back(static_cast<float>(n.z));
+        path.push_back(vertex.path);
+        order.push_back(vertex.order);
+        throughput.insert(throughput.end(), vertex.throughput.begin(), vertex.throughput.end());
+    }
 };
 
-PathTracer::PathTracer(const HeightField& surface, const Lambertian& material, int n_channels,
-                       const PathTracerOptions& options)
+PathTracer::PathTracer(const HeightField& surface, const Material& material, const PathTracerOptions& options)
     : surface_(surface),
       material_(material),
-      n_channels_(n_channels),
+      lambertian_(pure_lambertian(material)),
+      n_channels_(static_cast<int>(material.channels.size())),
       options_(options),
       max_slope_(steepest_facet(surface)),
       scene_(surface) {
@@ -74,35 +97,33 @@ double PathTracer::scale() const {
     return static_cast<double>(s.nx) * s.ny / measured / static_cast<double>(paths());
 }
 
-Vec3 PathTracer::facet_normal(const SceneHit& hit) const {
-    const Gradient g = facet_gradient(surface_, hit.kind, hit.i, hit.j);
-    const double z = 1 / area_ratio(g);
-    return {-g.x * z, -g.y * z, z};
-}
-
-double PathTracer::albedo(const SceneHit& hit, int channel) const {
-    return material_.albedo.at(channel, hit.i, hit.j);
-}
-
 bool PathTracer::can_hit(const Vec3& d) const {
     return !options_.allow_skips || d.z <= max_slope_ * std::hypot(d.x, d.y) * (1 + 1e-6);
 }
 
-PathTracer::Vertices PathTracer::trace_paths(int view, const Vec3& wo, int block, RayCounts& counts) const {
+int PathTracer::paths_of(int block) const {
+    const long long first_stratum = static_cast<long long>(block) * strata_per_block;
+    return 2 * static_cast<int>(std::min<long long>(strata_per_block, paths() / 2 - first_stratum));
+}
+
+template <class Scatter, class Escape>
+void PathTracer::walk(int stream, const Vec3& from, int block, RayCounts& counts, Scatter&& scatter,
+                      Escape&& escape) const {
     const HeightField& s = surface_;
     const long long first_stratum = static_cast<long long>(block) * strata_per_block;
-    const int n_paths =
-        2 * static_cast<int>(std::min<long long>(strata_per_block, paths() / 2 - first_stratum));
+    const int n_paths = paths_of(block);
     const auto random = [&](int path, int order) {
-        return random_words(options_.seed, static_cast<uint64_t>(view) << 32 | static_cast<uint32_t>(order),
+        return random_words(options_.seed, static_cast<uint64_t>(stream) << 32 | static_cast<uint32_t>(order),
                             2 * first_stratum + path);
     };
 
+    // Rays on their way, of which path, and where they go.
     std::vector<SceneRay> rays(n_paths), next_rays;
-    std::vector<SceneHit> hits(n_paths);
     std::vector<int> path_of(n_paths), next_path_of;
-    std::vector<float> throughput(static_cast<size_t>(n_paths) * n_channels_, 1.0f);
-    const ScenePoint down = scene_.direction({-wo.x, -wo.y, -wo.z});
+    std::vector<Vec3> heading(n_paths, {-from.x, -from.y, -from.z}), next_heading;
+    std::vector<SceneHit> hits;
+    std::vector<float> throughputs(static_cast<size_t>(n_paths) * n_channels_, 1.0f);
+    const ScenePoint down = scene_.direction(heading.front());
     for (int path = 0; path < n_paths; ++path) {
         // Strata in strips of two rows: neighbours in the list are neighbours on the relief, and packets stay
         // coherent.
@@ -118,84 +139,138 @@ PathTracer::Vertices PathTracer::trace_paths(int view, const Vec3& wo, int block
     }
     counts.camera += n_paths;
 
-    Vertices vertices;
     for (int order = 1; !rays.empty(); ++order) {
         hits.resize(rays.size());
         scene_.first_hits(rays, hits);
         next_rays.clear();
         next_path_of.clear();
+        next_heading.clear();
         for (size_t k = 0; k < rays.size(); ++k) {
             const SceneHit& hit = hits[k];
+            const int path = path_of[k];
+            const std::span<float> throughput(&throughputs[static_cast<size_t>(path) * n_channels_],
+                                              static_cast<size_t>(n_channels_));
             if (hit.kind == SceneHit::lost || (order == 1 && hit.kind == SceneHit::escaped)) ++counts.lost;
-            if (hit.kind < 0) continue;
+            if (hit.kind == SceneHit::escaped && order > 1) escape(path, order - 1, heading[k], throughput);
+            if (hit.kind < 0 || (options_.max_order > 0 && order > options_.max_order)) continue;
             const bool inside = hit.i >= s.border_x && hit.i < s.nx - s.border_x &&  //
                                 hit.j >= s.border_y && hit.j < s.ny - s.border_y;
             if (order == 1 && !inside) continue;
 
-            const int path = path_of[k];
-            float* weight = &throughput[static_cast<size_t>(path) * n_channels_];
-            float largest = 0;
-            for (int c = 0; c < n_channels_; ++c) {
-                weight[c] *= static_cast<float>(albedo(hit, c));
-                largest = std::max(largest, weight[c]);
-            }
-            if (largest == 0) continue;
-            const Vec3 n = facet_normal(hit);
-            const ScenePoint point = scene_.surface_point(hit);
-            vertices.point.push_back(point);
-            vertices.nx.push_back(static_cast<float>(n.x));
-            vertices.ny.push_back(static_cast<float>(n.y));
-            vertices.nz.push_back(static_cast<float>(n.z));
-            vertices.path.push_back(path);
-            vertices.order.push_back(order);
-            vertices.throughput.insert(vertices.throughput.end(), weight, weight + n_channels_);
-            if (order == options_.max_order) continue;
-
+            const Vec3 wo{-heading[k].x, -heading[k].y, -heading[k].z};
+            const Vertex vertex{
+                path, order, hit, scene_.surface_point(hit), wo, throughput, random(path, order)};
+            const std::optional<Vec3> d = scatter(vertex);
+            if (!d) continue;
             // Russian roulette: a vertex costs a shadow ray for every light, so faint paths are thinned.
             // Unbiased at albedo 1 too, where it never strikes: every path escapes by itself.
-            const auto word = random(path, order);
-            const float survival = std::min(1.0f, 2 * largest);
-            if (uniform_float(word[2]) >= survival) continue;
-            for (int c = 0; c < n_channels_; ++c) weight[c] /= survival;
-            const Vec3 d = cosine_sample(n, uniform_double(word[0]), uniform_double(word[1]));
-            if (!can_hit(d)) {
+            const float survival =
+                std::min(1.0f, 2 * *std::max_element(throughput.begin(), throughput.end()));
+            if (uniform_float(vertex.random[2]) >= survival) continue;
+            for (float& weight : throughput) weight /= survival;
+            if (!can_hit(*d)) {
                 ++counts.spared;
+                escape(path, order, *d, throughput);
                 continue;
             }
-            next_rays.push_back({point, scene_.direction(d)});
+            next_rays.push_back({vertex.point, scene_.direction(*d)});
             next_path_of.push_back(path);
+            next_heading.push_back(*d);
         }
         std::swap(rays, next_rays);
         std::swap(path_of, next_path_of);
+        std::swap(heading, next_heading);
         counts.bounce += static_cast<long long>(rays.size());
     }
-    return vertices;
+}
+
+std::optional<Vec3> PathTracer::sample(const Vertex& vertex, const FacetBrdf& facet) const {
+    std::vector<double> weight(n_channels_);
+    const auto& word = vertex.random;
+    const auto sample = facet.sample(vertex.wo, uniform_double(word[3]), uniform_double(word[0]),
+                                     uniform_double(word[1]), weight);
+    if (!sample) return std::nullopt;
+    for (int c = 0; c < n_channels_; ++c) vertex.throughput[c] *= static_cast<float>(weight[c]);
+    return sample->wi;
+}
+
+void PathTracer::add_to_path(std::span<const float> f, int order, std::span<float> of_path) const {
+    for (int c = 0; c < n_channels_; ++c) {
+        of_path[c] += f[c];
+        if (order <= options_.separate_orders) of_path[order * n_channels_ + c] += f[c];
+    }
+}
+
+// To value[path][slice][channel]: pi throughput f_micro cos of the vertices that the light wi sees.
+void PathTracer::add_lambertian(const Vertices& vertices, std::span<const int> seen, const Vec3& wi,
+                                std::span<float> value) const {
+    const auto x = static_cast<float>(wi.x), y = static_cast<float>(wi.y), z = static_cast<float>(wi.z);
+    std::vector<float> f(n_channels_);
+    for (const int v : seen) {
+        const float cosine = vertices.nx[v] * x + vertices.ny[v] * y + vertices.nz[v] * z;
+        for (int c = 0; c < n_channels_; ++c)
+            f[c] = vertices.throughput[static_cast<size_t>(v) * n_channels_ + c] * cosine;
+        add_to_path(f, vertices.order[v], value.subspan(vertices.path[v] * n_values(), n_values()));
+    }
+}
+
+void PathTracer::add_any(const Vertices& vertices, std::span<const int> seen, const Vec3& wi,
+                         std::span<float> value) const {
+    std::vector<float> f(n_channels_);
+    std::vector<double> f_micro(n_channels_);
+    for (const int v : seen) {
+        const FacetBrdf& facet = vertices.facet[v];
+        facet.eval(wi, vertices.wo[v], f_micro);
+        const double cosine = pi * dot(facet.normal(), wi);
+        for (int c = 0; c < n_channels_; ++c)
+            f[c] = vertices.throughput[static_cast<size_t>(v) * n_channels_ + c] *
+                   static_cast<float>(f_micro[c] * cosine);
+        add_to_path(f, vertices.order[v], value.subspan(vertices.path[v] * n_values(), n_values()));
+    }
 }
 
 PathTally PathTracer::trace(int view, const Vec3& wo, std::span<const Vec3> lights, int block,
                             const Monitor& monitor) const {
     monitor.check_cancelled();
     PathTally tally;
-    const size_t n_slices = 1 + options_.separate_orders, n_values = n_slices * n_channels_;
-    tally.sum.resize(lights.size() * n_values);
-    tally.squared_spread.resize(lights.size() * n_values);
-    const Vertices vertices = trace_paths(view, wo, block, tally.rays);
+    tally.sum.resize(lights.size() * n_values());
+    tally.squared_spread.resize(lights.size() * n_values());
+    Vertices vertices;
+    const auto scatter = [&](const Vertex& vertex) -> std::optional<Vec3> {
+        const FacetBrdf brdf = facet(vertex.hit);
+        const bool last = vertex.order == options_.max_order;
+        if (!lambertian_) {
+            vertices.add(vertex, brdf.normal());
+            vertices.facet.push_back(brdf);
+            vertices.wo.push_back(vertex.wo);
+            return last ? std::nullopt : sample(vertex, brdf);
+        }
+        float largest = 0;
+        for (int c = 0; c < n_channels_; ++c) {
+            float& weight = vertex.throughput[c];
+            weight *= static_cast<float>(lambertian_->albedo.at(c, vertex.hit.i, vertex.hit.j));
+            largest = std::max(largest, weight);
+        }
+        if (largest == 0) return std::nullopt;
+        vertices.add(vertex, brdf.normal());
+        if (last) return std::nullopt;
+        return cosine_sample(brdf.normal(), uniform_double(vertex.random[0]),
+                             uniform_double(vertex.random[1]));
+    };
+    walk(view, wo, block, tally.rays, scatter, [](int, int, const Vec3&, std::span<const float>) {});
 
     const size_t n_vertices = vertices.point.size();
-    std::vector<float> value(size_t{2} * strata_per_block * n_values);  // [path][slice][channel]
-    std::vector<float> cosine(n_vertices);
-    std::vector<int> facing(n_vertices);
+    std::vector<float> value(size_t{2} * strata_per_block * n_values());  // [path][slice][channel]
+    std::vector<int> facing(n_vertices), seen;
     std::vector<uint8_t> visible(n_vertices);
     for (size_t l = 0; l < lights.size(); ++l) {
         if (l % 16 == 0) monitor.check_cancelled();
         const Vec3& wi = lights[l];
         const auto x = static_cast<float>(wi.x), y = static_cast<float>(wi.y), z = static_cast<float>(wi.z);
-        for (size_t k = 0; k < n_vertices; ++k)
-            cosine[k] = vertices.nx[k] * x + vertices.ny[k] * y + vertices.nz[k] * z;
         size_t n_facing = 0;
         for (size_t k = 0; k < n_vertices; ++k) {
             facing[n_facing] = static_cast<int>(k);
-            n_facing += cosine[k] > 0;
+            n_facing += vertices.nx[k] * x + vertices.ny[k] * y + vertices.nz[k] * z > 0;
         }
         if (can_hit(wi)) {
             scene_.visible(vertices.point, {facing.data(), n_facing}, scene_.direction(wi), visible);
@@ -204,25 +279,21 @@ PathTally PathTracer::trace(int view, const Vec3& wo, std::span<const Vec3> ligh
             std::fill_n(visible.begin(), n_facing, uint8_t{1});
             tally.rays.spared += static_cast<long long>(n_facing);
         }
-
+        seen.clear();
+        for (size_t k = 0; k < n_facing; ++k)
+            if (visible[k]) seen.push_back(facing[k]);
         std::fill(value.begin(), value.end(), 0.0f);
-        for (size_t k = 0; k < n_facing; ++k) {
-            if (!visible[k]) continue;
-            const int v = facing[k], order = vertices.order[v];
-            float* of_path = &value[vertices.path[v] * n_values];
-            for (int c = 0; c < n_channels_; ++c) {
-                const float f = vertices.throughput[static_cast<size_t>(v) * n_channels_ + c] * cosine[v];
-                of_path[c] += f;
-                if (order <= options_.separate_orders) of_path[order * n_channels_ + c] += f;
-            }
-        }
+        if (lambertian_)
+            add_lambertian(vertices, seen, wi, value);
+        else
+            add_any(vertices, seen, wi, value);
         const double to_f = 1 / (pi * wi.z);
         for (int stratum = 0; stratum < strata_per_block; ++stratum) {
-            const float *first = &value[2 * stratum * n_values], *second = first + n_values;
-            for (size_t k = 0; k < n_values; ++k) {
+            const float *first = &value[2 * stratum * n_values()], *second = first + n_values();
+            for (size_t k = 0; k < n_values(); ++k) {
                 const double a = to_f * first[k], b = to_f * second[k];
-                tally.sum[l * n_values + k] += a + b;
-                tally.squared_spread[l * n_values + k] += (a - b) * (a - b);
+                tally.sum[l * n_values() + k] += a + b;
+                tally.squared_spread[l * n_values() + k] += (a - b) * (a - b);
             }
         }
     }

@@ -1,22 +1,24 @@
-// The judge: an unbiased path tracer for Lambertian reliefs. Slow, and sharing nothing with what it judges
-// but the relief itself.
+// The judge: an unbiased path tracer for reliefs of any material. Slow, and sharing nothing with what it
+// judges but the relief itself and the reflectance of a facet (material/facet_brdf.h).
 //
-// A path starts from a point of a horizontal plane above the relief, stratified over the period, along the
-// viewing direction; it bounces by cosine sampling until it escapes, and every vertex is connected to all
-// lights (next-event estimation), so each path serves all lights, orders and channels. With the vertex k of a
-// path carrying throughput prod(albedo_1..k), its estimate is
-//     f(wi, wo) = 1 / (pi cos_i) sum_k throughput_k <n_k, wi>+ V(p_k, wi).
+// A path starts from a point of a horizontal plane above the relief, stratified over the period, and bounces
+// by sampling the facets' reflectance until it escapes.
+//
+// It starts along the viewing direction, and every vertex is connected to all lights (next-event estimation),
+// so each path serves all lights, orders and channels. With throughput_k, the product of f_micro cos / pdf over
+// the vertices before k, its estimate is
+//     f(wi, wo) = 1 / cos_i sum_k throughput_k f_micro(wi, wo_k) <n_k, wi>+ V(p_k, wi).
 // Exact for the facets but for rounding: Embree's floats place a ray to about 1e-5 cell, which shows (0.1 %)
 // where only slivers are lit or seen: slope * tan(theta) above about 2000.
 #pragma once
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "base/monitor.h"
 #include "directions/direction.h"
-#include "material/material.h"
+#include "material/facet_brdf.h"
 #include "scattering/embree_scene.h"
 #include "surface/height_field.h"
 
@@ -48,15 +50,14 @@ struct PathTally {
 class PathTracer {
   public:
     // surface and material must outlive the tracer.
-    PathTracer(const HeightField& surface, const Lambertian& material, int n_channels,
-               const PathTracerOptions& options);
+    PathTracer(const HeightField& surface, const Material& material, const PathTracerOptions& options);
 
     long long paths() const { return 2LL * strata_ * strata_; }
     // The paths of a view are traced in blocks of fixed size: the unit of work of a thread.
     int blocks() const;
 
-    // Block `block` of view number `view` (which keys the random numbers). Thread-safe. Throws
-    // Error(cancelled).
+    // Block `block` of view number `view` (which keys the random numbers). What has no density (mirrors) is
+    // not met by lights of a single direction. Thread-safe. Throws Error(cancelled).
     PathTally trace(int view, const Vec3& wo, std::span<const Vec3> lights, int block,
                     const Monitor& monitor) const;
 
@@ -65,14 +66,28 @@ class PathTracer {
 
   private:
     struct Vertices;
-    Vertices trace_paths(int view, const Vec3& wo, int block, RayCounts& rays) const;
-    Vec3 facet_normal(const SceneHit& hit) const;
-    double albedo(const SceneHit& hit, int channel) const;
+    struct Vertex;
+    // Paths that start against the direction `from`. scatter(vertex) records what it wants of the vertex,
+    // multiplies the path's throughput by what the facet makes of it, and returns where the path goes on, or
+    // nothing. escape(path, order, direction, throughput) is told of those that leave after `order` bounces.
+    template <class Scatter, class Escape>
+    void walk(int stream, const Vec3& from, int block, RayCounts& counts, Scatter&& scatter,
+              Escape&& escape) const;
+    std::optional<Vec3> sample(const Vertex& vertex, const FacetBrdf& facet) const;
+    int paths_of(int block) const;
+    FacetBrdf facet(const SceneHit& hit) const { return {material_, surface_, hit.kind, hit.i, hit.j}; }
+    void add_lambertian(const Vertices& vertices, std::span<const int> seen, const Vec3& wi,
+                        std::span<float> value) const;
+    void add_any(const Vertices& vertices, std::span<const int> seen, const Vec3& wi,
+                 std::span<float> value) const;
+    void add_to_path(std::span<const float> f, int order, std::span<float> of_path) const;
+    size_t n_values() const { return (1 + static_cast<size_t>(options_.separate_orders)) * n_channels_; }
     // Whether a ray along d, d.z > 0 being up, can meet the relief at all (Lipschitz bound).
     bool can_hit(const Vec3& d) const;
 
     const HeightField& surface_;
-    const Lambertian& material_;
+    const Material& material_;
+    const Lambertian* lambertian_;  // if the material is that alone: its vertices need not be evaluated
     int n_channels_;
     PathTracerOptions options_;
     int strata_ = 1;  // along x and along y. Square even for a relief invariant along y: a few strata hold

@@ -57,6 +57,27 @@ struct Case {
     }
 };
 
+// "micro" of an entry; nothing for separable masking, which is not offered.
+inline std::optional<Lobe> lobe_of(const nlohmann::json& micro) {
+    const std::string type = micro.at("type");
+    const auto number = [&](const char* key, const char* other) {
+        return micro.value(key, micro.value(other, 1.0));
+    };
+    if (type == "lambertian") return Lambertian{micro.at("rho").get<double>()};
+    if (type == "phong_lafortune") return Phong{micro.at("exponent").get<double>(), number("ks", "F_or_ks")};
+    if (micro.value("G", "").find("separable") != std::string::npos) return std::nullopt;
+    const double alpha = micro.at("alpha");
+    return Microfacet{type == "ggx" ? Microfacet::Distribution::ggx : Microfacet::Distribution::beckmann,
+                      alpha,
+                      alpha,
+                      0.0,
+                      {number("F", "F_or_ks"), {}, {}}};
+}
+
+inline AnglesDeg angles_of(const nlohmann::json& pair) {
+    return {pair.at(0).get<double>(), pair.at(1).get<double>()};
+}
+
 // Cases of the families vgroove (Lambertian), rectgroove, spherical_pits, sinusoid and eggcrate.
 inline Case load_case(const std::string& name) {
     Case result;
