@@ -36,6 +36,27 @@ struct Accuracy {
 // Who carries the light; `automatic` leaves it to the material and the error that each would leave.
 enum class TransportKind { automatic, diffuse, pair_graph, forward };
 
+// A BRDF in terms of spherical harmonics instead of a table: fitting/sh_projection.h.
+struct ProjectionPlan {
+    enum class Basis { sh, hsh };
+    enum class Weighting {
+        none,   // g = f
+        cosine  // g = f cos_i cos_o: bounded and symmetric
+    };
+    enum class Form {
+        per_light,  // g(wo) for each incident direction of the plan
+        matrix,     // g(wi, wo) = sum_ab C_ab y_a(wi) y_b(wo)
+        joint       // the same with its symmetries: reciprocity and, if `isotropic`, turns and mirrors around z
+    };
+    Basis basis = Basis::hsh;
+    int order = 8;  // 1 to max_harmonic_order: bands 0 to order - 1
+    // Random directions per light (per_light) or side (matrix), or random pairs in all (joint); 0: a quadrature grid.
+    int samples = 0;
+    Weighting weighting = Weighting::cosine;
+    Form form = Form::per_light;
+    bool isotropic = true;  // joint
+};
+
 struct BrdfPlan {
     std::vector<AnglesDeg> incident, outgoing;  // as in Table
     std::vector<std::pair<int, int>> pairs;     // as in Table: empty for the full product
@@ -43,6 +64,7 @@ struct BrdfPlan {
     bool separate_orders = false;               // K slices of single orders beside the sum
     TransportKind transport = TransportKind::automatic;
     Accuracy accuracy;
+    std::optional<ProjectionPlan> project;      // then set_projection_directions() has set the directions
 };
 
 struct RunOptions {
