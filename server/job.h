@@ -66,6 +66,7 @@ struct Job {
     MaterialSource material;
     MeasurePlan plan;
     std::vector<OutputRequest> outputs;
+    BaseCurvature base;  // of what the surface stands on
 };
 
 // What a document does not say about itself.

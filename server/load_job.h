@@ -19,8 +19,8 @@ struct LoadedSurface {
 };
 
 // Throws Error: not_found and io with the file's name, invalid_input and missing_unit with a path under
-// "/surface".
-LoadedSurface load_surface(const SurfaceSource& source);
+// "/surface", or "/base" if the relief does not fit on that base.
+LoadedSurface load_surface(const SurfaceSource& source, const BaseCurvature& base = {});
 
 // The material with its maps, if it has any, read and registered to the surface: a map has the size of the
 // stored surface and goes through the same y_axis, crop, resample and boundary. Integer images are normalised

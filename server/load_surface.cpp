@@ -2,6 +2,7 @@
 
 #include "base/error.h"
 #include "server/load_job.h"
+#include "visibility/curvature.h"
 
 namespace gonio {
 namespace {
@@ -44,11 +45,14 @@ LoadedSurface load(const GeneratedSurface& source) {
 
 }  // namespace
 
-LoadedSurface load_surface(const SurfaceSource& source) {
+LoadedSurface load_surface(const SurfaceSource& source, const BaseCurvature& base) {
     LoadedSurface loaded = std::visit([](const auto& kind) { return load(kind); }, source);
+    loaded.surface.base = base;
+    check_base(loaded.surface);
     loaded.hash = surface_hash(loaded.surface);
     loaded.statistics = surface_statistics(loaded.surface);
     loaded.warnings = surface_warnings(loaded.surface, loaded.statistics);
+    for (std::string& warning : base_warnings(loaded.surface)) loaded.warnings.push_back(std::move(warning));
     return loaded;
 }
 

@@ -57,11 +57,11 @@ std::string resolved(const std::string& path, const std::string& folder) {
 Job parse_job(std::string_view text, const JobOrigin& origin) {
     const nlohmann::json document = parse_json_strictly(text);
     const JsonNode root(document);
-    root.allow_keys({"surface", "material", "measure", "accuracy", "output"});
+    root.allow_keys({"surface", "base", "material", "measure", "accuracy", "output"});
     return {parse_surface(root.at("surface"), origin.folder),
             parse_material(root.at("material"), origin.folder),
             parse_measure(root.at("measure"), parse_accuracy(root.find("accuracy"))),
-            parse_outputs(root.find("output"), origin.name)};
+            parse_outputs(root.find("output"), origin.name), parse_base(root.find("base"))};
 }
 
 SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin) {

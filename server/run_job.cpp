@@ -33,13 +33,19 @@ BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOpti
         {"seed", std::to_string(plan.accuracy.seed)},
     };
     result.table.provenance.insert(result.table.provenance.begin(), origin.begin(), origin.end());
+    if (const BaseCurvature& base = loaded.surface.surface.base; base.is_curved()) {
+        char text[120];
+        std::snprintf(text, sizeof text, "%.9g 1/m at %.9g degrees from x, %.9g 1/m across", base.kappa_1,
+                      degrees(base.direction), base.kappa_2);
+        result.table.provenance.emplace_back("base", text);
+    }
     return result;
 }
 
 }  // namespace
 
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference) {
-    LoadedJob loaded{job, load_surface(job.surface), {}, reference};
+    LoadedJob loaded{job, load_surface(job.surface, job.base), {}, reference};
     loaded.material = load_material(job.material, job.surface, loaded.surface);
     const ReferenceOptions* options = reference ? &*reference : nullptr;
     loaded.hash = job_hash(loaded.surface.hash, loaded.material, job.plan, options);

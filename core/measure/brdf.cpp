@@ -6,6 +6,7 @@
 #include "measure/describe.h"
 #include "measure/measurement.h"
 #include "measure/simplify.h"
+#include "visibility/curvature.h"
 
 namespace gonio {
 namespace {
@@ -86,6 +87,7 @@ RowGroups row_groups(const Table& table) {
 BrdfResult measure_brdf(const HeightField& surface, const Material& material, const BrdfPlan& plan,
                         const RunOptions& options, const Monitor& monitor) {
     validate(material, surface.nx, surface.ny);
+    check_base(surface);
     if (plan.incident.empty() || plan.outgoing.empty())
         throw Error(ErrorCode::invalid_input, "/measure", "",
                     "needs at least one incident and one outgoing direction");

@@ -30,8 +30,7 @@ double noise_correction_percent(const RunContext& context, const Stage& stage) {
 }
 
 int unresolved_directions(const RunContext& context, const Stage& stage) {
-    if (stage.settings.tiles_x > 0 || context.surface->border_x > 0 || context.surface->border_y > 0)
-        return 0;
+    if (stage.settings.tiles_x > 0 || !context.projected_area_is_known()) return 0;
     int n = 0;
     for (const Moments* projected : {&stage.projected_lights, &stage.projected_views})
         for (const double ratio : projected->mean()) n += unresolved_share(ratio) > 0;
@@ -71,6 +70,9 @@ void describe_runs(const RunContext& context, const std::vector<Stage>& stages, 
                        {"links substituted at window borders", totals.substituted},
                        {"links dropped at window borders", totals.dropped},
                        {"nearly horizontal bundles given up", static_cast<double>(totals.truncated_bundles)}};
+    if (totals.turn > 0)
+        report.settings.emplace_back(
+            "turn", "frames turn by " + number(degrees(totals.turn)) + " degrees (rms) from facet to facet");
     report.seconds = {{"visibility and direct light", totals.seconds_direct},
                       {"operator", totals.seconds_links},
                       {"orders of scattering", totals.seconds_series}};

@@ -101,7 +101,7 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
         const Stage& stage = *used[s];
         const double share = weight[s] / weights;
         std::vector<double> unresolved(rows, 0.0);
-        if (stage.settings.tiles_x == 0 && context.surface->border_x == 0 && context.surface->border_y == 0)
+        if (stage.settings.tiles_x == 0 && context.projected_area_is_known())
             for (size_t r = 0; r < rows; ++r)
                 unresolved[r] =
                     std::min(1.0, unresolved_share(stage.projected_lights.mean()[groups.light[r]]) +

@@ -120,6 +120,7 @@ void Measurement::add_runs(const std::vector<RunValues>& runs, Stage& stage) {
         stage.projected_views.add(r.projected_views);
         stage.remainder = std::max(stage.remainder, r.remainder);
         stage.ratio = std::max(stage.ratio, r.ratio);
+        totals_.turn = std::max(totals_.turn, r.turn);
         totals_.rays += r.rays;
         totals_.rays_skipped += r.rays_skipped;
         totals_.links += r.links;

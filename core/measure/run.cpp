@@ -25,6 +25,9 @@ struct Shifts {
     double operator()(int which) const { return uniform_double(random_words(seed, stream, which)[0]); }
 };
 
+// Turned lights are evaluated this many times the rms turn along links away: most turns lie within.
+constexpr double turn_step = 1.5;
+
 // Lights and views that are worked on together, and the table rows they answer.
 struct Block {
     std::vector<int> lights, views;
@@ -163,8 +166,7 @@ struct Sums {
 void write_rows(const RunContext& context, const Block& block, const Sums& sums, size_t slices,
                 RunValues& values) {
     const size_t n_rows = context.rows(), n_channels = context.n_channels();
-    const bool map = context.lambertian->albedo.is_map(),
-               open = context.surface->border_x > 0 || context.surface->border_y > 0;
+    const bool map = context.lambertian->albedo.is_map(), plain_area = !context.projected_area_is_known();
     auto view_of = [&](const Block::Row& row) {
         return block.same ? context.lights[block.lights[row.view]] : context.views[block.views[row.view]];
     };
@@ -173,11 +175,10 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
         const Matrix& direct = sums.direct[map ? c : 0];
         const std::vector<Matrix>& orders = sums.orders[map ? c : 0];
         for (const Block::Row& row : block.rows) {
-            // Of a part of a surface the projected area is not A cos theta in truth: an open surface is
-            // divided by the plain area.
-            const double projected = open ? std::pow(sums.core_area, 2) *
-                                                context.lights[block.lights[row.light]].z * view_of(row).z
-                                          : sums.projected_lights[row.light] * sums.projected_views[row.view];
+            const double projected =
+                plain_area
+                    ? std::pow(sums.core_area, 2) * context.lights[block.lights[row.light]].z * view_of(row).z
+                    : sums.projected_lights[row.light] * sums.projected_views[row.view];
             // area cos_i cos_o P_l P_v = projected_l projected_v / area
             const double unit = projected > 0 ? sums.core_area / (pi * projected) : 0.0,
                          scale = albedo * unit;
@@ -222,7 +223,9 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
                         padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
     const double links =
         unknowns * settings.directions / (settings.refinement * settings.refinement) * 0.35 * sizeof(Link);
-    return copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
+    const bool both = s.base.kappa_1 != 0 && s.base.kappa_2 != 0;
+    const double turned = s.base.is_curved() ? (both ? 6 : 3) * 2.5 * unknowns * 4 * padded(n_lights) : 0;
+    return turned + copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
 }
 
 std::string settings_key(const RunContext& context, const RunSettings& settings) {
@@ -297,8 +300,17 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     options.fixed_applications = values.applications;
                 options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
                 options.keep_orders = context.keep_orders;
-                if (!context.lambertian->albedo.is_map())
-                    options.albedos = context.lambertian->albedo.constant;
+                if (!context.lambertian->albedo.is_map()) options.albedos = context.lambertian->albedo.constant;
+                const bool curved = context.surface->base.is_curved();
+                TurnedLight turned;
+                if (curved) {
+                    const double turn = rms_turn(op);
+                    values.turn = std::max(values.turn, turn);
+                    turned = turned_light(*context.grid, tile, lights, irradiance.lights,
+                                          std::clamp(turn_step * turn, 1e-3, 0.3), sub_samples,
+                                          context.allow_skips, n_threads, monitor);
+                    values.rays += turned.rays;
+                }
                 const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),
                              base_views = factors.size() > 1 ? irradiance.views : Fields();
                 for (size_t c = 0; c < std::max<size_t>(1, factors.size()); ++c) {
@@ -310,14 +322,22 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                         scale_rows(irradiance.lights, tile, factors[c], n_threads);
                         if (!block.same) scale_rows(irradiance.views, tile, factors[c], n_threads);
                     }
-                    series.push_back(diffuse_series(op, tile, irradiance.lights, irradiance.view_fields(),
-                                                    block.same, factors.empty() ? nullptr : &factors[c],
-                                                    options, n_threads, monitor));
+                    const ChannelFactors* channel = factors.empty() ? nullptr : &factors[c];
+                    if (curved) {
+                        TurnedLight light = turned;
+                        if (channel)
+                            for (Fields& f : light.coefficients) scale_rows(f, tile, *channel, n_threads);
+                        series.push_back(turned_series(op, tile, std::move(light), irradiance.view_fields(),
+                                                       channel, options, n_threads, monitor));
+                    } else {
+                        series.push_back(diffuse_series(op, tile, irradiance.lights, irradiance.view_fields(),
+                                                        block.same, channel, options, n_threads, monitor));
+                    }
                     if (options.keep_first && c == 0) {
                         values.first = std::move(series.back().first);
-                        values.first_irradiance =
-                            first_block(block.same || lights.size() <= views.size() ? irradiance.lights
-                                                                                    : irradiance.views);
+                        values.first_irradiance = first_block(
+                            curved || block.same || lights.size() <= views.size() ? irradiance.lights
+                                                                                  : irradiance.views);
                     }
                     values.ratio = std::max(values.ratio, series.back().ratio);
                     values.remainder = std::max(values.remainder, series.back().remainder);

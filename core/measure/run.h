@@ -26,6 +26,11 @@ struct RunContext : MeasuredScene {
     bool keep_first = false;  // RunValues::first, for the noise bias
 
     bool transports() const { return indirect && max_order != 1; }
+    // The projected area of one period is A cos theta in truth. Not so of a part of a surface, or on a curved
+    // base: there values are divided by the plain area.
+    bool projected_area_is_known() const {
+        return surface->border_x == 0 && surface->border_y == 0 && !surface->base.is_curved();
+    }
 };
 
 struct RunSettings {
@@ -40,6 +45,7 @@ struct RunValues {
     int higher_orders = 0;  // single orders kept beyond the first
     int applications = 0;
     double ratio = 0, remainder = 0;  // largest, see OrderSeries
+    double turn = 0;                  // on a curved base: rms turn of the frame along links, radians
     // f in 1/sr, [channel][slice][row]; slices as in Table: 0 the sum, then single orders if they are kept
     // apart for the table.
     std::vector<float> f;

@@ -92,6 +92,7 @@ void visit(Archive& archive, Run& run) {
     archive(run.applications);
     archive(run.ratio);
     archive(run.remainder);
+    archive(run.turn);
     archive(run.f);
     archive(run.direct);
     archive(run.projected_lights);

@@ -29,6 +29,7 @@ HeightField swap_axes(const HeightField& s) {
     std::swap(t.nx, t.ny);
     std::swap(t.pitch_x, t.pitch_y);
     std::swap(t.border_x, t.border_y);
+    t.base = s.base.axes_swapped();
     for (int j = 0; j < s.ny; ++j)
         for (int i = 0; i < s.nx; ++i)
             t.heights[static_cast<size_t>(i) * t.nx + j] = s.heights[static_cast<size_t>(j) * s.nx + i];

@@ -38,6 +38,10 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
     if (kind == TransportKind::diffuse && !lambertian)
         throw Error(ErrorCode::invalid_input, "/measure/transport", "diffuse",
                     "carries the light of Lambertian facets alone; leave it to \"auto\"");
+    if (scene.surface->base.is_curved() && kind != TransportKind::diffuse)
+        throw Error(ErrorCode::invalid_input, "/base", "",
+                    std::string("only the light of Lambertian facets is carried over a curved base, not by ") +
+                        name_of(kind));
     report.settings.push_back({"transport", name_of(kind)});
     report.settings.push_back({"transport_why", why});
     switch (kind) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "scattering/series_weights.h"
@@ -22,9 +23,15 @@ class Transport {
             return y;
         }
         Fields scaled = x;
-        scale_rows(scaled, tile_, *factors_, n_threads_);
+        scale(scaled);
         apply(op_, scaled, y, n_threads_);
-        scale_rows(y, tile_, *factors_, n_threads_);
+        scale(y);
+        return y;
+    }
+    TurnedLight next(TurnedLight x) const {
+        for (Fields& f : x.coefficients) scale(f);
+        TurnedLight y = apply(op_, x, n_threads_);
+        for (Fields& f : y.coefficients) scale(f);
         return y;
     }
     void add(const Combination& a, const Combination& b, Matrix& sum) const {
@@ -32,6 +39,9 @@ class Transport {
     }
 
   private:
+    void scale(Fields& fields) const {
+        if (factors_) scale_rows(fields, tile_, *factors_, n_threads_);
+    }
     const LinkOperator& op_;
     const Tile& tile_;
     const ChannelFactors* factors_;
@@ -161,13 +171,13 @@ OrderSeries symmetric_series(const Transport& transport, const Fields& g, const 
     return result;
 }
 
-// Different lights and views: transport the smaller set, meet the other one at every order.
+// Transports one side, meets the other one at every order. next: from one order to the next.
 OrderSeries one_sided_series(const Transport& transport, const Fields& lights, const Fields& views,
+                             bool from_lights, const std::function<Fields(const Fields&)>& next,
                              const SeriesOptions& options, const Monitor& monitor) {
     OrderSeries result;
     const int wanted = options.max_order == 0 ? std::numeric_limits<int>::max() : options.max_order - 1;
-    const bool from_lights = lights.n_columns() <= views.n_columns(),
-               apart = options.keep_orders || options.albedos.size() > 1;
+    const bool apart = options.keep_orders || options.albedos.size() > 1;
     const Fields& source = from_lights ? lights : views;
     auto meet = [&](const Combination& carried) {
         Matrix m(lights.n_columns(), views.n_columns());
@@ -183,11 +193,11 @@ OrderSeries one_sided_series(const Transport& transport, const Fields& lights, c
     while (result.applications < wanted && result.applications < 2 * options.max_applications) {
         monitor.check_cancelled();
         const Fields& before = carried.empty() ? source : carried.back();
-        Fields next = transport.next(before);
-        const bool lit = decline.add(before, next);
-        if (options.keep_first && result.applications == 0) result.first = next;
+        Fields after = next(before);
+        const bool lit = decline.add(before, after);
+        if (options.keep_first && result.applications == 0) result.first = after;
         if (apart) carried.clear();
-        carried.push_back(std::move(next));
+        carried.push_back(std::move(after));
         ++result.applications;
         if (apart) result.orders.push_back(meet({{&carried.back(), 1}}));
         result.remainder = lit ? decline.remainder(result.applications, most) : 0.0;
@@ -213,8 +223,25 @@ OrderSeries diffuse_series(const LinkOperator& op, const Tile& tile, const Field
                            const Fields& views, bool same_directions, const ChannelFactors* factors,
                            const SeriesOptions& options, int n_threads, const Monitor& monitor) {
     const Transport transport(op, tile, factors, n_threads);
-    return same_directions ? symmetric_series(transport, lights, options, monitor)
-                           : one_sided_series(transport, lights, views, options, monitor);
+    if (same_directions) return symmetric_series(transport, lights, options, monitor);
+    // The smaller set is transported.
+    return one_sided_series(
+        transport, lights, views, lights.n_columns() <= views.n_columns(),
+        [&](const Fields& x) { return transport.next(x); }, options, monitor);
+}
+
+OrderSeries turned_series(const LinkOperator& op, const Tile& tile, TurnedLight lights, const Fields& views,
+                          const ChannelFactors* factors, const SeriesOptions& options, int n_threads,
+                          const Monitor& monitor) {
+    const Transport transport(op, tile, factors, n_threads);
+    const Fields first = lights.coefficients[0];
+    return one_sided_series(
+        transport, first, views, true,
+        [&](const Fields&) {
+            lights = transport.next(std::move(lights));
+            return lights.coefficients[0];
+        },
+        options, monitor);
 }
 
 }  // namespace gonio

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "scattering/link_operator.h"
+#include "scattering/turned_light.h"
 
 namespace gonio {
 
@@ -33,5 +34,12 @@ struct OrderSeries {
 OrderSeries diffuse_series(const LinkOperator& op, const Tile& tile, const Fields& lights,
                            const Fields& views, bool same_directions, const ChannelFactors* factors,
                            const SeriesOptions& options, int n_threads, const Monitor& monitor);
+
+// The same on a curved base, where light and view are told in the frame of the point that is seen: lights are
+// carried as turned_light does it, factors included, from the lights' side only. OrderSeries::first is K of
+// the lights.
+OrderSeries turned_series(const LinkOperator& op, const Tile& tile, TurnedLight lights, const Fields& views,
+                          const ChannelFactors* factors, const SeriesOptions& options, int n_threads,
+                          const Monitor& monitor);
 
 }  // namespace gonio

@@ -176,4 +176,24 @@ Irradiance compute_irradiance(const MarchGrid& grid, const Tile& tile, const std
     return result;
 }
 
+LightIrradiance light_irradiance(const MarchGrid& grid, const Tile& tile, const std::vector<Vec3>& lights,
+                                 const std::vector<SubSample>& sub_samples, bool skip_steep, int n_threads,
+                                 const Monitor& monitor) {
+    LightIrradiance result;
+    RayCounts counts;
+    const int n_lights = static_cast<int>(lights.size());
+    Fields sample(tile.n_unknowns(), n_lights);
+    if (sub_samples.size() > 1) result.lights = zero_fields(tile.n_unknowns(), n_lights);
+    for (const SubSample& place : sub_samples) {
+        expand_directions(grid, tile, lights, place, skip_steep, n_threads, monitor, sample, counts);
+        if (sub_samples.size() > 1)
+            add_scaled(sample, 1.0f / static_cast<float>(sub_samples.size()), n_threads, result.lights);
+    }
+    if (sub_samples.size() == 1) result.lights = std::move(sample);
+    result.rays = static_cast<double>(counts.marched);
+    result.rays_skipped = static_cast<double>(counts.skipped);
+    result.truncated_bundles = counts.truncated;
+    return result;
+}
+
 }  // namespace gonio

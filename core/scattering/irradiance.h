@@ -44,6 +44,17 @@ Irradiance compute_irradiance(const MarchGrid& grid, const Tile& tile, const std
                               const std::vector<ChannelFactors>& channels, bool skip_steep, int n_threads,
                               const Monitor& monitor);
 
+// The irradiance factors of the lights alone, where no product with views is wanted: sqrt(area) max(0, <n,
+// d>) V, averaged over the sub-samples.
+struct LightIrradiance {
+    Fields lights;
+    double rays = 0, rays_skipped = 0;
+    int truncated_bundles = 0;
+};
+LightIrradiance light_irradiance(const MarchGrid& grid, const Tile& tile, const std::vector<Vec3>& lights,
+                                 const std::vector<SubSample>& sub_samples, bool skip_steep, int n_threads,
+                                 const Monitor& monitor);
+
 // fields[u][c] *= factors[slot of u], for every part.
 void scale_rows(Fields& fields, const Tile& tile, const ChannelFactors& factors, int n_threads);
 

@@ -80,6 +80,61 @@ void links_loop(const LinkRecord* records, size_t n_records, const Link* links, 
     }
 }
 
+using V = hn::Vec<D>;
+
+// Coefficients of c(t + a) where c has one variable, or of c(t0 + a, t1 + b).
+template <int kCoefficients>
+HWY_INLINE void shift(const V* c, V a, V b, V* to) {
+    if constexpr (kCoefficients == 3) {
+        to[0] = hn::MulAdd(a, hn::MulAdd(a, c[2], c[1]), c[0]);
+        to[1] = hn::MulAdd(hn::Add(a, a), c[2], c[1]);
+        to[2] = c[2];
+    } else {
+        to[0] = hn::MulAdd(a, hn::MulAdd(a, c[3], hn::MulAdd(b, c[4], c[1])),
+                           hn::MulAdd(b, hn::MulAdd(b, c[5], c[2]), c[0]));
+        to[1] = hn::MulAdd(hn::Add(a, a), c[3], hn::MulAdd(b, c[4], c[1]));
+        to[2] = hn::MulAdd(hn::Add(b, b), c[5], hn::MulAdd(a, c[4], c[2]));
+        to[3] = c[3], to[4] = c[4], to[5] = c[5];
+    }
+}
+
+template <int kCoefficients>
+void turned_links_loop(const LinkRecord* records, size_t n_records, const Link* links, const LinkTurn* turns,
+                       int axis, const float* const* x, float* const* y) {
+    const D d;
+    const size_t lanes = hn::Lanes(d);
+    for (size_t r = 0; r < n_records; ++r)
+        for (size_t c = 0; c < 32; c += lanes) {
+            const size_t from = static_cast<size_t>(records[r].unknown) * 32 + c;
+            V own[kCoefficients], sum[kCoefficients], seen[kCoefficients], shifted[kCoefficients];
+            for (int m = 0; m < kCoefficients; ++m) {
+                own[m] = hn::LoadU(d, x[m] + from);
+                sum[m] = hn::Zero(d);
+            }
+            for (uint32_t k = records[r].begin; k < records[r + 1].begin; ++k) {
+                const size_t at = static_cast<size_t>(links[k].seen) * 32 + c;
+                const V w = hn::Set(d, links[k].weight), a = hn::Set(d, turns[k].about[axis]),
+                        b = hn::Set(d, turns[k].about[1]);
+                for (int m = 0; m < kCoefficients; ++m) seen[m] = hn::LoadU(d, x[m] + at);
+                shift<kCoefficients>(seen, a, b, shifted);
+                for (int m = 0; m < kCoefficients; ++m) sum[m] = hn::MulAdd(w, shifted[m], sum[m]);
+                shift<kCoefficients>(own, hn::Neg(a), hn::Neg(b), shifted);
+                for (int m = 0; m < kCoefficients; ++m)
+                    hn::StoreU(hn::MulAdd(w, shifted[m], hn::LoadU(d, y[m] + at)), d, y[m] + at);
+            }
+            for (int m = 0; m < kCoefficients; ++m)
+                hn::StoreU(hn::Add(sum[m], hn::LoadU(d, y[m] + from)), d, y[m] + from);
+        }
+}
+
+void turned_links(const LinkRecord* records, size_t n_records, const Link* links, const LinkTurn* turns,
+                  int n_coefficients, int axis, const float* const* x, float* const* y) {
+    if (n_coefficients == 3)
+        turned_links_loop<3>(records, n_records, links, turns, axis, x, y);
+    else
+        turned_links_loop<6>(records, n_records, links, turns, 0, x, y);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace gonio
 HWY_AFTER_NAMESPACE();
@@ -88,6 +143,7 @@ HWY_AFTER_NAMESPACE();
 namespace gonio {
 HWY_EXPORT(expand);
 HWY_EXPORT(links_loop);
+HWY_EXPORT(turned_links);
 
 void expand_visible(const DirectionBlock& directions, const uint32_t* bits, size_t bits_stride, size_t first,
                     size_t count, const float* normal_x, const float* normal_y, const float* normal_z,
@@ -98,6 +154,11 @@ void expand_visible(const DirectionBlock& directions, const uint32_t* bits, size
 
 void apply_links(const LinkRecord* records, size_t n_records, const Link* links, const float* x, float* y) {
     HWY_DYNAMIC_DISPATCH(links_loop)(records, n_records, links, x, y);
+}
+
+void apply_turned_links(const LinkRecord* records, size_t n_records, const Link* links, const LinkTurn* turns,
+                        int n_coefficients, int axis, const float* const* x, float* const* y) {
+    HWY_DYNAMIC_DISPATCH(turned_links)(records, n_records, links, turns, n_coefficients, axis, x, y);
 }
 }  // namespace gonio
 #endif  // HWY_ONCE

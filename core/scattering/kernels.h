@@ -35,4 +35,16 @@ struct LinkRecord {
 // Self-adjoint by construction. records has one entry more than there are records: the end of the last.
 void apply_links(const LinkRecord* records, size_t n_records, const Link* links, const float* x, float* y);
 
+// On a curved base: how far the frame has turned from one end of a link to the other, radians about the two
+// principal directions of the base.
+struct LinkTurn {
+    float about[2];
+};
+
+// Fields that are polynomials of second degree in the turn of the frame (turned_light.h): 3 coefficients (1,
+// t, t^2) in one turn, the `axis`th, or 6 (1, t0, t1, t0^2, t0 t1, t1^2) in both. For each link (p, q, w, t):
+// y[p] += w x[q] shifted by t, and y[q] += w x[p] shifted by -t. turns: parallel to links.
+void apply_turned_links(const LinkRecord* records, size_t n_records, const Link* links, const LinkTurn* turns,
+                        int n_coefficients, int axis, const float* const* x, float* const* y);
+
 }  // namespace gonio

@@ -5,10 +5,38 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "visibility/curvature.h"
 #include "visibility/march.h"
 
 namespace gonio {
 namespace {
+
+// How the frame turns along a ray.
+struct Turning {
+    double rate = 0;         // radians per cell of travel,
+    double towards[2] = {};  // towards this horizontal direction
+    double about[2] = {};    // and its parts along the principal directions of the base
+
+    Vec3 turned(const Vec3& direction, double travel) const {
+        return turned_direction(direction, rate * travel, towards[0], towards[1]);
+    }
+};
+Turning turning_along(const MarchGrid& grid, const Vec3& direction) {
+    Turning turning;
+    const MarchDirection step = to_march_direction(grid, direction);
+    const double x = step.step_x * grid.pitch_x, y = step.step_y * grid.pitch_y;
+    const BaseCurvature::Tensor k = grid.base.tensor();
+    const double turn_x = k.xx * x + k.xy * y, turn_y = k.xy * x + k.yy * y;
+    const double c = std::cos(grid.base.direction), s = std::sin(grid.base.direction);
+    turning.rate = std::hypot(turn_x, turn_y);
+    if (turning.rate > 0) {
+        turning.towards[0] = turn_x / turning.rate;
+        turning.towards[1] = turn_y / turning.rate;
+    }
+    turning.about[0] = c * turn_x + s * turn_y;
+    turning.about[1] = c * turn_y - s * turn_x;
+    return turning;
+}
 
 // One ray bundle of the operator: a direction from one part of one facet kind.
 struct OperatorBundle {
@@ -16,6 +44,7 @@ struct OperatorBundle {
     Vec3 direction;
     double weight;  // solid angle / (2 pi) times the number of parts: half of the symmetric link
     int kind, part;
+    Turning turning = {};  // on a curved base
 };
 
 // Lines of cells that are marched together. Bundles that march transposed run along y.
@@ -28,6 +57,7 @@ struct LineGroup {
 struct PendingLink {
     uint32_t start;  // of the ray: line * width + position inside its group of lines
     Link link;
+    LinkTurn turn;
 };
 
 int into_period(int i, int n) {
@@ -91,8 +121,16 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
         auto cosine = [&](size_t slot) {
             return x * tile.normal_x[slot] + y * tile.normal_y[slot] + z * tile.normal_z[slot];
         };
+        const bool curved = grid.base.is_curved();
+        auto arriving_cosine = [&](size_t slot, double travel) {
+            if (!curved) return cosine(slot);
+            const Vec3 d = bundle.turning.turned(bundle.direction, travel);
+            return static_cast<float>(bundle.weight * (d.x * tile.normal_x[slot] + d.y * tile.normal_y[slot] +
+                                                       d.z * tile.normal_z[slot]));
+        };
         for (int line = 0; line < group.n_lines; ++line) {
             uint32_t seen = nothing, seen_slot = 0;
+            double travel = 0;  // to what is seen
             for (int word = 0; word < words; ++word) {
                 const size_t at = static_cast<size_t>(line) * words + word;
                 for (uint32_t left = lines.hit[at]; left != 0; left &= left - 1) {
@@ -107,6 +145,7 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
                         const int kind = group.transposed ? 1 - facet.kind : facet.kind;
                         seen_slot = static_cast<uint32_t>(tile.slot(kind, hit_row, hit_column));
                         seen = seen_slot;
+                        travel = (bundle.rays.facets[k - 1].travel + facet.travel) / 2.0;
                         if (tile.refinement > 1)
                             seen += n_slots *
                                     static_cast<uint32_t>(hit_part(
@@ -124,12 +163,15 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
                     // that each sends per projected area; the balance heuristic (Veach 1997, 9.2) shares it
                     // so. Half each would let the few rays of a tall wall outshout the many of the ground.
                     const float from = tile.sqrt_area[slot] * cosine(slot),
-                                to = -tile.sqrt_area[seen_slot] * cosine(seen_slot);
+                                to = -tile.sqrt_area[seen_slot] * arriving_cosine(seen_slot, travel);
                     const float weight =
                         from > 0 && to > 0
                             ? 2 * from * to / (tile.sqrt_area[slot] * from + tile.sqrt_area[seen_slot] * to)
                             : 0.0f;
-                    pending.push_back({static_cast<uint32_t>(line * width + position), {seen, weight}});
+                    pending.push_back({static_cast<uint32_t>(line * width + position),
+                                       {seen, weight},
+                                       {{static_cast<float>(travel * bundle.turning.about[0]),
+                                         static_cast<float>(travel * bundle.turning.about[1])}}});
                 }
             }
         }
@@ -139,7 +181,7 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
 // Groups the pending links by the unknown they start from (counting sort, stable: the order of the directions
 // stays).
 void append_records(const Tile& tile, const LineGroup& group, const std::vector<PendingLink>& pending,
-                    LinkOperator::Chunk& chunk) {
+                    bool curved, LinkOperator::Chunk& chunk) {
     const int width = group.transposed ? tile.area.height : tile.area.width;
     std::vector<uint32_t> place(static_cast<size_t>(width) * group.n_lines, 0);
     for (const PendingLink& p : pending) ++place[p.start];
@@ -159,7 +201,12 @@ void append_records(const Tile& tile, const LineGroup& group, const std::vector<
             count = begin;  // from now on: where the next link goes
         }
     chunk.links.resize(end);
-    for (const PendingLink& p : pending) chunk.links[place[p.start]++] = p.link;
+    if (curved) chunk.turns.resize(end);
+    for (const PendingLink& p : pending) {
+        const uint32_t at = place[p.start]++;
+        chunk.links[at] = p.link;
+        if (curved) chunk.turns[at] = p.turn;
+    }
 }
 
 }  // namespace
@@ -174,6 +221,7 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
         const FacetPoint point = facet_point(kind, jitter[i].a, jitter[i].b, tile.refinement, part);
         bundles[task] = {make_ray_bundle(grid, set.directions[i], point, max_march_travel), set.directions[i],
                          set.solid_angle[i] * n_parts / (2 * pi), kind, part};
+        if (grid.base.is_curved()) bundles[task].turning = turning_along(grid, set.directions[i]);
     });
 
     constexpr int lines_together = 4;
@@ -201,7 +249,7 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
              g < std::min(groups.size(), static_cast<size_t>(c + 1) * groups_per_chunk); ++g) {
             pending.clear();
             trace_group(grid, tile, bundles, groups[g], lines, pending, counts[c]);
-            append_records(tile, groups[g], pending, op.chunks[c]);
+            append_records(tile, groups[g], pending, grid.base.is_curved(), op.chunks[c]);
         }
         op.chunks[c].records.push_back({0, static_cast<uint32_t>(op.chunks[c].links.size())});
     });

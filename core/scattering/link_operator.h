@@ -19,6 +19,7 @@ struct LinkOperator {
     struct Chunk {
         std::vector<LinkRecord> records;  // one more than there are: its end
         std::vector<Link> links;
+        std::vector<LinkTurn> turns;  // parallel to links on a curved base, else empty
     };
     std::vector<Chunk> chunks;
     double rays = 0, links = 0;

@@ -70,8 +70,10 @@ HeightField make_height_field(int nx, int ny, double pitch_x, double pitch_y,
 std::string surface_hash(const HeightField& s) {
     const int sizes[] = {s.nx, s.ny, s.border_x, s.border_y};
     const double pitches[] = {s.pitch_x, s.pitch_y};
-    return sha256_hex(
-        {bytes_of(sizes, 4), bytes_of(pitches, 2), bytes_of(s.heights.data(), s.heights.size())});
+    std::vector<double> base;  // a flat one leaves no trace
+    if (s.base.is_curved()) base = {s.base.kappa_1, s.base.kappa_2, s.base.direction};
+    return sha256_hex({bytes_of(sizes, 4), bytes_of(pitches, 2), bytes_of(s.heights.data(), s.heights.size()),
+                       bytes_of(base.data(), base.size())});
 }
 
 }  // namespace gonio

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/numeric.h"
+#include "surface/base_curvature.h"
 
 namespace gonio {
 
@@ -15,6 +16,7 @@ struct HeightField {
     double pitch_x = 0, pitch_y = 0;  // metres, > 0
     double mean_height = 0;           // metres
     std::vector<float> heights;       // nx * ny, row by row, metres above mean_height
+    BaseCurvature base;               // of what stands at mean_height: flat unless a job says otherwise
 
     // An open surface is measured only inside the rectangle of cells [border_x, nx - border_x) x [border_y, ny - border_y): outside
     // it, rays could reach the edge of the patch. 0 for periodic and mirrored surfaces.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace gonio {
 namespace {
@@ -73,11 +74,52 @@ std::vector<RawCrossing> list_crossings(double u, double v, double dx, double dy
     return list;
 }
 
+// How the base bends the rays of a bundle; lengths in units of pitch_x.
+struct Bend {
+    double kappa;   // normal curvature
+    double length;  // base distance of one cell of travel
+    double slope;   // of the ray at its start
+
+    double angle(double travel) const { return kappa * length * travel; }
+    double scale(double travel) const { return std::cos(angle(travel)) - slope * std::sin(angle(travel)); }
+    double rise(double travel) const {
+        const double half = std::sin(angle(travel) / 2);
+        return (2 * half * half + slope * std::sin(angle(travel))) / kappa;
+    }
+    // Smallest travel after which the ray that starts at height `from` stands at height `to`, if any.
+    // With t = tan(gamma / 2) and q = (R + from) / (R + to): (1 + q) t^2 + 2 m t - (1 - q) = 0.
+    std::optional<double> travel_to(double from, double to) const {
+        const double q = (1 + kappa * from) / (1 + kappa * to), rest = kappa * (to - from) / (1 + kappa * to);
+        const double squared = slope * slope + rest * (1 + q);
+        if (squared < 0) return {};
+        const double root = std::sqrt(squared), sign = kappa > 0 ? 1 : -1;
+        std::optional<double> least;
+        auto offer = [&](double t) {
+            const double travel = 2 * std::atan(t) / (kappa * length);
+            if (sign * t > 0 && (!least || travel < *least)) least = travel;
+        };
+        // Each root in the form that does not cancel.
+        const double far = -(slope + std::copysign(root, slope));
+        offer(far / (1 + q));
+        if (far != 0) offer(-rest / far);
+        return least;
+    }
+};
+
+// Travel after which every ray of the bundle has left or hit.
+double resolved_travel(const Bend& bend, const MarchGrid& grid, double max_travel) {
+    const double quarter_turn = pi / 2 / (std::abs(bend.kappa) * bend.length);
+    double travel = std::min(max_travel, quarter_turn);
+    if (const auto left = bend.travel_to(grid.lowest, grid.highest)) travel = std::min(travel, *left + 2);
+    if (const auto hit = bend.travel_to(grid.highest, grid.lowest)) travel = std::min(travel, *hit + 2);
+    return travel;
+}
+
 // Greedy runs of crossings that fit a window. The first crossings are tested singly: most rays that hit do so
 // there.
 std::vector<CrossingGroup> group_crossings(const std::vector<RawCrossing>& list,
-                                           const std::vector<Crossing>& crossings, double rise, int nx,
-                                           int ny) {
+                                           const std::vector<Crossing>& crossings, double rise,
+                                           const std::optional<Bend>& bend, int nx, int ny) {
     constexpr int singly = 16;
     std::vector<CrossingGroup> groups;
     const int n = static_cast<int>(list.size());
@@ -93,8 +135,17 @@ std::vector<CrossingGroup> group_crossings(const std::vector<RawCrossing>& list,
             if (x_hi - x_lo > size || y_hi - y_lo > size) break;
             x_min = x_lo, x_max = x_hi, y_min = y_lo, y_max = y_hi;
         }
-        const float lowest = rise > 0 ? crossings[k].rise : crossings[end - 1].rise;
-        groups.push_back({end, window, wrap_index(x_min, nx), wrap_index(y_min, ny), lowest});
+        CrossingGroup group{end, window, wrap_index(x_min, nx), wrap_index(y_min, ny),
+                            rise > 0 ? crossings[k].rise : crossings[end - 1].rise};
+        if (bend)
+            for (int c = k; c < end; ++c) {
+                const float scale = crossings[c].weight0 + crossings[c].weight1;
+                if (c == k || (bend->kappa > 0 ? scale > group.scale : scale < group.scale)) {
+                    group.scale = scale;
+                    group.lowest_rise = crossings[c].rise;
+                }
+            }
+        groups.push_back(group);
         k = end;
     }
     return groups;
@@ -142,25 +193,51 @@ RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const Fa
     const double weights[2][3] = {{1 - u, u - v, v}, {1 - v, v - u, u}};
     for (int k = 0; k < 3; ++k) bundle.start_weight[k] = static_cast<float>(weights[kind][k]);
 
-    // A rising ray is free once above the highest point, a falling one has hit once below the lowest.
-    const double range = static_cast<double>(grid.highest) - grid.lowest;
+    std::optional<Bend> bend;
+    if (grid.base.is_curved()) {
+        const double x = bundle.transposed ? dy : dx,
+                     y = (bundle.transposed ? dx : dy) * grid.pitch_y / grid.pitch_x,
+                     kappa = grid.pitch_x * grid.base.along(x, y), length = std::hypot(x, y);
+        if (kappa != 0) bend = Bend{kappa, length, rise / length};
+    }
     double travel = max_travel;
-    if (std::abs(rise) > 0) travel = std::min(max_travel, range / std::abs(rise) + 2);
-    bundle.truncated = travel == max_travel;
-    // One row: after one period everything repeats below the risen ray.
-    if (plane.ny == 1 && rise >= 0) travel = std::min(travel, plane.nx / std::max(std::abs(dx), 1e-6) + 2);
-    const std::vector<RawCrossing> list = list_crossings(u, v, dx, dy, travel);
+    if (bend) {
+        travel = resolved_travel(*bend, grid, max_travel);
+        bundle.truncated = travel == max_travel || std::abs(bend->angle(travel)) >= pi / 2;
+    } else {
+        // A rising ray is free once above the highest point, a falling one has hit once below the lowest.
+        const double range = static_cast<double>(grid.highest) - grid.lowest;
+        if (std::abs(rise) > 0) travel = std::min(max_travel, range / std::abs(rise) + 2);
+        bundle.truncated = travel == max_travel;
+        // One row: after one period everything repeats below the risen ray.
+        if (plane.ny == 1 && rise >= 0)
+            travel = std::min(travel, plane.nx / std::max(std::abs(dx), 1e-6) + 2);
+    }
+    std::vector<RawCrossing> list = list_crossings(u, v, dx, dy, travel);
+    if (bend)  // a steep ray leaves long before it is as steep as the base
+        std::erase_if(list, [&](const RawCrossing& c) { return !(bend->scale(c.travel) > 0); });
 
     bundle.crossings.reserve(list.size());
     bundle.facets.reserve(list.size());
     for (const RawCrossing& c : list) {
-        bundle.crossings.push_back({static_cast<float>(1 - c.weight), static_cast<float>(c.weight),
-                                    static_cast<float>(rise * c.travel), wrap_index(c.x0, plane.nx),
-                                    wrap_index(c.y0, plane.ny),
-                                    (c.y1 - c.y0) * plane.stride + (c.x1 - c.x0)});
+        const double scale = bend ? bend->scale(c.travel) : 1.0;
+        bundle.crossings.push_back(
+            {static_cast<float>(scale * (1 - c.weight)), static_cast<float>(scale * c.weight),
+             static_cast<float>(bend ? bend->rise(c.travel) : rise * c.travel), wrap_index(c.x0, plane.nx),
+             wrap_index(c.y0, plane.ny), (c.y1 - c.y0) * plane.stride + (c.x1 - c.x0)});
         bundle.facets.push_back({c.cell_x, c.cell_y, c.kind, static_cast<float>(c.travel)});
     }
-    bundle.groups = group_crossings(list, bundle.crossings, rise, plane.nx, plane.ny);
+    if (bend) {
+        bundle.bent = true;
+        bundle.kappa = static_cast<float>(bend->kappa);
+        float lowest = grid.highest;
+        for (const RawCrossing& c : list) {
+            lowest = std::min(
+                lowest, static_cast<float>(bend->scale(c.travel) * grid.highest - bend->rise(c.travel)));
+            bundle.escape.push_back(lowest);
+        }
+    }
+    bundle.groups = group_crossings(list, bundle.crossings, rise, bend, plane.nx, plane.ny);
     return bundle;
 }
 

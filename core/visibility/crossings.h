@@ -48,6 +48,7 @@ struct CrossingGroup {
     int window;         // index of window_max, -1: test singly
     int column, row;    // of the window
     float lowest_rise;  // of the ray inside the window
+    float scale = 1;    // of the window's maximum, see RayBundle::bent
 };
 
 struct RayBundle {
@@ -59,6 +60,18 @@ struct RayBundle {
     std::vector<CrossedFacet> facets;  // parallel to crossings
     std::vector<CrossingGroup> groups;
     bool truncated = false;  // longer than max_travel: rays may still be inside the relief at its end
+
+    // On a curved base (surface/base_curvature.h) a ray of slope m that starts at height h0 passes below a
+    // relief of height h at base distance d = gamma R if
+    //     (R + h) (cos gamma - m sin gamma) > R + h0:
+    // linear in h and h0, so that all rays still share one list. The weights of its crossings carry
+    // C = cos gamma - m sin gamma, and `rise` is R (1 - C). Exact but for the sagitta kappa pitch^2 / 8 of an
+    // edge. Along azimuths of no curvature a bundle is straight.
+    bool bent = false;
+    float kappa = 0;  // normal curvature times pitch_x
+    // A ray has left once it has been above the highest point: what a hollow base does further away is
+    // macroscopic, and the renderer's business. Crossing k is hit by no ray that starts above escape[k].
+    std::vector<float> escape;  // parallel to crossings where the bundle is bent
 };
 
 // start.kind and start.u, v are in untransposed coordinates; the bundle holds transposed ones where it

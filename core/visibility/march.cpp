@@ -57,10 +57,11 @@ HWY_INLINE void start_rays(const Block& b, int offset, VF& height, M& front) {
     height = hn::MulAdd(h00, hn::Set(d, bundle.start_weight[0]),
                         hn::MulAdd(own, hn::Set(d, bundle.start_weight[1]),
                                    hn::Mul(h11, hn::Set(d, bundle.start_weight[2]))));
-    const VF facing =
-        hn::NegMulAdd(gradient_x, hn::Set(d, static_cast<float>(bundle.direction.step_x)),
-                      hn::NegMulAdd(gradient_y, hn::Set(d, static_cast<float>(bundle.direction.step_y)),
-                                    hn::Set(d, static_cast<float>(bundle.direction.rise))));
+    VF rise = hn::Set(d, static_cast<float>(bundle.direction.rise));
+    if (bundle.bent) rise = hn::MulAdd(hn::Mul(rise, hn::Set(d, bundle.kappa)), height, rise);
+    const VF facing = hn::NegMulAdd(
+        gradient_x, hn::Set(d, static_cast<float>(bundle.direction.step_x)),
+        hn::NegMulAdd(gradient_y, hn::Set(d, static_cast<float>(bundle.direction.step_y)), rise));
     front = hn::Gt(facing, hn::Zero(d));
 }
 
@@ -73,8 +74,8 @@ HWY_INLINE uint32_t mask_bits(M mask) {
 }
 
 // Marches 2 vectors of rays; returns front and hit lanes as bits and, where asked, the crossing behind each
-// hit.
-template <bool kWantCrossing>
+// hit. kBent: as bundle.bent.
+template <bool kWantCrossing, bool kBent>
 HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_bits, int32_t* crossing) {
     const D d;
     const DI di;
@@ -89,19 +90,32 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
     const M front0 = active0, front1 = active1;
     VI at0 = hn::Zero(di), at1 = hn::Zero(di);
     const VF top = hn::Set(d, b.highest);
+    auto none_below = [&](VF left) HWY_ATTR {
+        return hn::AllFalse(
+            d, hn::Or(hn::And(active0, hn::Gt(left, height0)), hn::And(active1, hn::Gt(left, height1))));
+    };
 
     if (!hn::AllFalse(d, hn::Or(active0, active1))) {
         int k = 1;  // crossing 0 is the edge of the ray's own facet
         for (const CrossingGroup& group : bundle.groups) {
             if (group.window >= 0) {
-                const VF rise = hn::Set(d, group.lowest_rise);
-                const VF ray0 = hn::Add(height0, rise), ray1 = hn::Add(height1, rise);
-                if (rising && hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(top, ray0)),
-                                                     hn::And(active1, hn::Gt(top, ray1)))))
-                    break;
                 const float* w = node_at(plane, plane.window_max[group.window], b, group.column, group.row);
-                const M need = hn::Or(hn::And(active0, hn::Gt(hn::LoadU(d, w), ray0)),
-                                      hn::And(active1, hn::Gt(hn::LoadU(d, w + lanes), ray1)));
+                const VF rise = hn::Set(d, group.lowest_rise);
+                M need;
+                if constexpr (kBent) {
+                    if (none_below(hn::Set(d, bundle.escape[k]))) break;
+                    const VF scale = hn::Set(d, group.scale);
+                    need = hn::Or(
+                        hn::And(active0, hn::Gt(hn::MulSub(hn::LoadU(d, w), scale, rise), height0)),
+                        hn::And(active1, hn::Gt(hn::MulSub(hn::LoadU(d, w + lanes), scale, rise), height1)));
+                } else {
+                    const VF ray0 = hn::Add(height0, rise), ray1 = hn::Add(height1, rise);
+                    if (rising && hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(top, ray0)),
+                                                         hn::And(active1, hn::Gt(top, ray1)))))
+                        break;
+                    need = hn::Or(hn::And(active0, hn::Gt(hn::LoadU(d, w), ray0)),
+                                  hn::And(active1, hn::Gt(hn::LoadU(d, w + lanes), ray1)));
+                }
                 if (hn::AllFalse(d, need)) {
                     k = group.end;
                     continue;
@@ -113,9 +127,14 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
                 const float* p = node_at(plane, plane.heights, b, c.column, c.row);
                 const float* q = p + c.second_node;
                 const VF w0 = hn::Set(d, c.weight0), w1 = hn::Set(d, c.weight1), rise = hn::Set(d, c.rise);
-                const VF edge0 = hn::MulAdd(hn::LoadU(d, q), w1, hn::MulSub(hn::LoadU(d, p), w0, rise));
-                const VF edge1 =
+                VF edge0 = hn::MulAdd(hn::LoadU(d, q), w1, hn::MulSub(hn::LoadU(d, p), w0, rise));
+                VF edge1 =
                     hn::MulAdd(hn::LoadU(d, q + lanes), w1, hn::MulSub(hn::LoadU(d, p + lanes), w0, rise));
+                if constexpr (kBent) {
+                    const VF escape = hn::Set(d, bundle.escape[k]);
+                    edge0 = hn::Min(edge0, escape);
+                    edge1 = hn::Min(edge1, escape);
+                }
                 const M above0 = hn::Gt(edge0, height0), above1 = hn::Gt(edge1, height1);
                 if constexpr (kWantCrossing) {
                     const VI index = hn::Set(di, k);
@@ -128,13 +147,10 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
                     done = true;
                     break;
                 }
-                if (rising && (k & 7) == 7) {
-                    const VF left = hn::Sub(top, rise);
-                    if (hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(left, height0)),
-                                               hn::And(active1, hn::Gt(left, height1))))) {
-                        done = true;
-                        break;
-                    }
+                if ((kBent || rising) && (k & 7) == 7 &&
+                    none_below(kBent ? hn::Set(d, bundle.escape[k]) : hn::Sub(top, rise))) {
+                    done = true;
+                    break;
                 }
             }
             if (done) break;
@@ -146,6 +162,14 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
         hn::StoreU(at0, di, crossing);
         hn::StoreU(at1, di, crossing + lanes);
     }
+}
+
+template <bool kWantCrossing>
+HWY_INLINE void march_block_of(const Block& b, uint32_t& front, uint32_t& hit, int32_t* crossing) {
+    if (b.bundle->bent)
+        march_pair<kWantCrossing, true>(b, front, hit, crossing);
+    else
+        march_pair<kWantCrossing, false>(b, front, hit, crossing);
 }
 
 HWY_INLINE uint32_t tail_mask(int width, int word) {
@@ -166,9 +190,9 @@ void march_lines(const MarchPlane& plane, const RayBundle& bundle, float highest
             for (; b.lane < march_block; b.lane += step) {
                 uint32_t f, h;
                 if (crossing)
-                    march_pair<true>(b, f, h, crossing + at * march_block + b.lane);
+                    march_block_of<true>(b, f, h, crossing + at * march_block + b.lane);
                 else
-                    march_pair<false>(b, f, h, nullptr);
+                    march_block_of<false>(b, f, h, nullptr);
                 all_front |= f << b.lane;
                 all_hit |= h << b.lane;
             }

@@ -74,6 +74,24 @@ MarchPlane make_plane(const std::vector<float>& nodes, int nx, int ny) {
     return plane;
 }
 
+// A chord is parallel to some tangent of the profile that it cuts, and profiles are at most `slope` steep but
+// for the stretching of the base. A hollow turns tangents up on the way, by its curvature times the length of
+// the chord, which ends where it leaves the layer of the relief (crossings.h).
+double steepest_ray(const MarchGrid& grid, double slope) {
+    if (!grid.base.is_curved()) return slope;
+    const double kappas[] = {grid.base.kappa_1 * grid.pitch_x, grid.base.kappa_2 * grid.pitch_x};
+    const double low = grid.lowest, high = grid.highest;
+    double steepest = 0;
+    for (const double kappa : kappas) {
+        const double stretched = slope / (1 + std::min(kappa * low, kappa * high));
+        const double within = std::max(stretched, std::sqrt(2 * std::max(0.0, -kappa) * (high - low))),
+                     turn = std::max(0.0, -kappa) * 2 * (high - low) / std::max(within, 1e-30);
+        const double up = std::atan(stretched) + turn;
+        steepest = std::max(steepest, up < 1.5 ? std::max(within, std::tan(up)) : 1e6);
+    }
+    return steepest;
+}
+
 }  // namespace
 
 MarchGrid make_march_grid(const HeightField& surface) {
@@ -103,7 +121,8 @@ MarchGrid make_march_grid(const HeightField& surface) {
             steepest_squared = std::max({steepest_squared, gx0 * gx0 + gy0 * gy0, gx1 * gx1 + gy1 * gy1});
         }
     }
-    grid.max_slope = std::sqrt(steepest_squared);
+    grid.base = surface.base;
+    grid.max_slope = steepest_ray(grid, std::sqrt(steepest_squared));
 
     grid.rows = make_plane(nodes, nx, ny);
     if (ny >= march_block) {

@@ -29,7 +29,9 @@ struct MarchGrid {
                             // if ny < march_block
     double pitch_x = 0, pitch_y = 0;
     float lowest = 0, highest = 0;  // in cells
-    double max_slope = 0;  // max |grad h| over facets (metric): a ray steeper than this can hit nothing
+    BaseCurvature base;             // as of the surface
+    double max_slope = 0;  // a ray steeper than this can hit nothing: max |grad h| over facets (metric), and
+                           // on a curved base what bending adds to that
 
     bool has_transposed() const { return !transposed.heights.empty(); }
 };

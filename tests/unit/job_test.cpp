@@ -165,7 +165,7 @@ TEST(JobDocument, SaysWhatWasMeant) {
     // Nothing is near: the allowed keys alone.
     const std::string far = message({{"zzzzzzzz", 1}});
     EXPECT_EQ(far.find("did you mean"), std::string::npos);
-    EXPECT_NE(far.find("surface, material, measure, accuracy, output"), std::string::npos);
+    EXPECT_NE(far.find("surface, base, material, measure, accuracy, output"), std::string::npos);
     EXPECT_EQ(message({{"surface", {{"period", 2}}}}),
               "/surface/period = 2: a length needs a unit: one of km, m, cm, mm, um, nm, pm, as in \"2 mm\"");
     EXPECT_EQ(parse_error(base_document({{"surface", {{"period", 2}}}}).dump()).code(),
@@ -329,6 +329,8 @@ TEST(JobHash, DoesNotDependOnSpelling) {
                   {{"measure", {{"max_order", "all"}, {"orders", "sum"}, {"transport", "auto"}}}})),
               hash);
     EXPECT_EQ(hash_of(base_document({{"output", {{{"format", "exr"}, {"path", "elsewhere.exr"}}}}})), hash);
+    EXPECT_EQ(hash_of(base_document({{"base", {{"kappa_1", 0}, {"kappa_2", 0}, {"direction_deg", 7}}}})),
+              hash);
     // Another order of the keys.
     EXPECT_EQ(
         load_job(
@@ -352,6 +354,9 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
     for (const json& merge : std::vector<json>{
              {{"surface", {{"period", "2.001 mm"}}}},
              {{"surface", {{"slope_deg", 44}}}},
+             {{"base", {{"kappa_1", 20}, {"kappa_2", 0}}}},
+             {{"base", {{"kappa_1", 20}, {"kappa_2", 20}}}},
+             {{"base", {{"kappa_1", 20}, {"kappa_2", 0}, {"direction_deg", 30}}}},
              {{"material", {{"albedo", 0.7}}}},
              {{"material", {{"albedo", {0.8, 0.8, 0.8}}}}},
              {{"measure", {{"incident", {{"theta_deg", {0, 31}}}}}}},
@@ -372,6 +377,27 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
     hashes.push_back(load_job(job, ReferenceOptions{65}).hash);
     std::sort(hashes.begin(), hashes.end());
     EXPECT_EQ(std::unique(hashes.begin(), hashes.end()), hashes.end());
+}
+
+TEST(LoadJob, RefusesBasesThatTheReliefDoesNotFit) {
+    const auto refused = [](double kappa) {
+        return error_of([&] {
+            load_job(parse(base_document({{"base", {{"kappa_1", 0}, {"kappa_2", kappa}}}})));
+        });
+    };
+    // Half a millimetre up and down, cells of 16 micrometres.
+    for (const double kappa : {1100.0, -1100.0}) {
+        EXPECT_EQ(refused(kappa).field(), "/base/kappa_2");
+        EXPECT_NE(refused(kappa).allowed().find("at most 1000 1/m"), std::string::npos)
+            << refused(kappa).allowed();
+    }
+    const auto load = [](double kappa) {
+        return load_job(parse(base_document({{"base", {{"kappa_1", 0}, {"kappa_2", kappa}}}})));
+    };
+    EXPECT_EQ(load(900).surface.surface.base.kappa_2, 900);
+    EXPECT_FALSE(load(900).surface.warnings.empty());
+    EXPECT_FALSE(load(-100).surface.warnings.empty());
+    EXPECT_TRUE(load(10).surface.warnings.empty());
 }
 
 TEST(JobHash, OfItsRunsLeavesOutWhenToStop) {

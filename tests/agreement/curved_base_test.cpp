@@ -1,0 +1,140 @@
+// The engine on curved bases against rays of Embree through reliefs that are really displaced from cylinders
+// and spheres.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "agreement/curved_patch.h"
+#include "agreement/measured.h"
+#include "surface/generate.h"
+#include "validation/statistics.h"
+#include "visibility/march.h"
+
+namespace gonio {
+namespace {
+
+constexpr int size = 32;
+
+HeightField relief(const BaseCurvature& base) {
+    HeightField surface = generate_gaussian(size, size, 1, 4, 0.7, 3);
+    surface.base = base;
+    return surface;
+}
+
+// The whole period as patches that are exact: one on a cylinder, small ones on a sphere.
+std::vector<std::unique_ptr<CurvedPatch>> patches_of(const HeightField& surface) {
+    const int core = surface.base.kappa_2 == 0 ? size : size / 4, margin = 72;
+    std::vector<std::unique_ptr<CurvedPatch>> patches;
+    for (int y = 0; y < size; y += core)
+        for (int x = 0; x < size; x += core)
+            patches.push_back(std::make_unique<CurvedPatch>(surface, x, y, core, margin));
+    return patches;
+}
+
+struct BaseCase {
+    const char* name;
+    BaseCurvature base;
+};
+
+class CurvedBase : public ::testing::TestWithParam<BaseCase> {};
+
+// Which points are lit, ray by ray.
+TEST_P(CurvedBase, LitMasks) {
+    const HeightField surface = relief(GetParam().base);
+    const MarchGrid grid = make_march_grid(surface);
+    const auto patches = patches_of(surface);
+    long long rays = 0, wrong = 0, dark = 0;
+    for (const AnglesDeg& light :
+         std::vector<AnglesDeg>{{30, 10}, {60, 75}, {75, 140}, {80, 0}, {85, 200}, {70, 300}})
+        for (int kind = 0; kind < 2; ++kind) {
+            const FacetPoint start = facet_point(kind, 0.41, 0.77);
+            const Vec3 d = to_vector(light);
+            std::vector<uint32_t> visible(size);
+            march_visible(grid, make_ray_bundle(grid, d, start, 3000), {0, 0, size, size}, visible.data());
+            for (size_t k = 0; k < patches.size(); ++k) {
+                const CurvedPatch& patch = *patches[k];
+                const int n = patch.core(), x0 = static_cast<int>(k) % (size / n) * n,
+                          y0 = static_cast<int>(k) / (size / n) * n;
+                for (int j = 0; j < n; ++j)
+                    for (int i = 0; i < n; ++i) {
+                        const CurvedPatch::Point p = patch.point(i, j, kind, start.u, start.v);
+                        const Vec3 w = p.in_space(d, surface.base);
+                        CurvedPatch::Point hit;
+                        const bool lit = dot(w, p.normal) > 0 && !patch.trace(p.position, w, &hit);
+                        ++rays;
+                        dark += !lit;
+                        wrong += lit != (visible[y0 + j] >> (x0 + i) & 1);
+                    }
+            }
+        }
+    std::printf("%s: %lld of %lld rays differ, %lld dark\n", GetParam().name, wrong, rays, dark);
+    EXPECT_LT(wrong, rays / 250);
+    EXPECT_GT(dark, rays / 10);
+}
+
+TEST_P(CurvedBase, OrdersOfScattering) {
+    const HeightField surface = relief(GetParam().base);
+    const auto owned = patches_of(surface);
+    std::vector<CurvedPatch*> patches;
+    for (const auto& p : owned) patches.push_back(p.get());
+    constexpr double albedo = 0.8;
+    constexpr int orders = 3, paths = 200000;
+    const std::vector<AnglesDeg> lights{{0, 0}, {40, 70}, {65, 180}, {80, 310}},
+        views{{5, 0}, {50, 20}, {75, 200}};
+    BrdfPlan apart = plan_for_target(lights, views, 0.004);
+    apart.max_order = orders;
+    apart.separate_orders = true;
+    const Table single = measure(surface, gray({1}), apart).table;
+    const Table all = measure(surface, gray({albedo}), plan_for_target(lights, views, 0.004)).table;
+    std::vector<Vec3> wi;
+    for (const AnglesDeg& light : lights) wi.push_back(to_vector(light));
+    std::vector<std::vector<double>> pulls(orders + 1);
+    for (size_t v = 0; v < views.size(); ++v) {
+        const auto traced = trace_view(patches, wi, to_vector(views[v]), orders, albedo, paths, 100 + v);
+        for (size_t l = 0; l < lights.size(); ++l)
+            for (int k = 0; k <= orders; ++k) {
+                const Table& table = k < orders ? single : all;
+                const size_t at = table.index(0, k < orders ? k + 1 : 0, l * views.size() + v);
+                const TracedOrders::Value& truth = k < orders ? traced[l].orders[k] : traced[l].all;
+                pulls[k].push_back((table.f[at] - truth.mean) / std::hypot(doubt(table, at), truth.se));
+                std::printf(
+                    "%s light %g view %g order %d: %.5f (%.5f), traced %.5f (%.5f), %+.1f sigma, %+.2f %%\n",
+                    GetParam().name, lights[l].theta_deg, views[v].theta_deg, k < orders ? k + 1 : 0,
+                    table.f[at], doubt(table, at), truth.mean, truth.se, pulls[k].back(),
+                    100 * (table.f[at] / truth.mean - 1));
+            }
+    }
+    for (int k = 0; k <= orders; ++k) {
+        const double bound = reference::sidak_sigmas(pulls[k].size() * (orders + 1));
+        for (const double pull : pulls[k])
+            EXPECT_LT(std::abs(pull), bound) << "order " << (k < orders ? k + 1 : 0);
+        EXPECT_LT(reference::rms(pulls[k]), 1.7) << "order " << (k < orders ? k + 1 : 0);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Bases, CurvedBase,
+                         ::testing::Values(BaseCase{"cylinder", {1.0 / 60, 0, 0}},
+                                           BaseCase{"turned cylinder", {1.0 / 60, 0, radians(30)}},
+                                           BaseCase{"sphere", {1.0 / 80, 1.0 / 80, 0}},
+                                           BaseCase{"hollow cylinder", {-1.0 / 200, 0, 0}}),
+                         [](const auto& param_case) {
+                             std::string name = param_case.param.name;
+                             std::replace(name.begin(), name.end(), ' ', '_');
+                             return name;
+                         });
+
+TEST(FlatBase, KappaZeroIsTheFlatEngine) {
+    const HeightField flat = relief({});
+    const BrdfPlan plan = plan_for_target({{30, 0}, {70, 90}}, {{0, 0}, {60, 200}}, 0.01);
+    const Table a = measure(flat, gray({0.7}), plan).table,
+                b = measure(relief({0, 0, 0.3}), gray({0.7}), plan).table;
+    EXPECT_EQ(a.f, b.f);
+    EXPECT_EQ(a.se, b.se);
+    // And the limit is there: a radius of 10^6 cells turns nothing.
+    const Table c = measure(relief({1e-6, 1e-6, 0}), gray({0.7}), plan).table;
+    expect_tables_agree(a, c, 4);
+}
+
+}  // namespace
+}  // namespace gonio
