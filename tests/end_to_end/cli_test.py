@@ -218,6 +218,18 @@ class Measure(Program):
         self.assertEqual(by_job["job_hash"], by_options["job_hash"])
         self.assertEqual(by_job["job"]["measure"]["outgoing"], [[0, 0], [0, 180], [30, 0], [30, 180]])
 
+    def test_takes_a_material(self):
+        ggx = '{"model": "ggx", "alpha": 0.3, "metal": "Cu"}'
+        self.write("copper.json", ggx)
+        jobs = [json.loads(self.gonio("measure", *self.GROOVE, *self.SMALL, "--material", material, "--print-job").stdout)
+                for material in (ggx, "copper.json")]
+        self.assertEqual(jobs[0]["material"], json.loads(ggx))
+        self.assertEqual(jobs[0], jobs[1])
+        too_rough = '{"model": "ggx", "alpha": 2, "reflectance": 1}'
+        self.assertIn("/material/alpha",
+                      self.gonio("measure", *self.GROOVE, *self.SMALL, "--material", too_rough, code=3).stderr)
+        self.gonio("measure", *self.GROOVE, "--material", ggx, "--albedo", "0.5", code=2)
+
     def test_writes_by_extension(self):
         self.gonio("measure", *self.GROOVE, *self.SMALL, "-o", "x/t.csv", "-o", "t.exr", "-q")
         self.assertEqual(self.files(), ["t.exr", "x/t.csv"])

@@ -445,6 +445,39 @@ TEST(Coat, TableIsTheMeanOverVisibleNormals) {
     }
 }
 
+// The corners of what is allowed, and grazing directions: finite, and no light made.
+TEST(FacetBrdf, HostileNumbers) {
+    std::vector<Material> list;
+    for (const double alpha : {1e-6, 1e-4, 1.0})
+        for (const Distribution d : {Distribution::ggx, Distribution::beckmann}) {
+            list.push_back({{"y"}, rough(d, alpha, 1)});
+            list.push_back({{"y"}, rough(d, alpha, alpha, 17, {{}, 1e-6, 1e6})});
+            list.push_back({{"y"}, rough(d, alpha, alpha, 17, {{}, 1e6, 0.0})});
+        }
+    for (const double alpha : {1e-6, 1.0})
+        for (const double eta : {1.0, 1e6}) list.push_back({{"y"}, CoatedDiffuse{eta, alpha, 1.0}});
+    for (const double exponent : {0.0, 1e6}) {
+        list.push_back({{"y"}, Phong{exponent, 1.0}});
+        list.push_back({{"y"}, BlinnPhong{exponent, 1.0}});
+    }
+    list.push_back({{"y"}, Mirror{{{}, 1.0, 0.0}}});
+    list.push_back({{"y"}, Lambertian{0.0}});
+    for (size_t m = 0; m < list.size(); ++m) {
+        const FacetBrdf brdf(list[m], flat, 0, 0, 0);
+        for (const double theta_deg : {0.0, 1e-6, 45.0, 89.0, 89.9999}) {
+            const Vec3 wo = direction(theta_deg, 33);
+            for (const Vec3& wi : {wo, direction(theta_deg, 213), direction(89.9999, 100)}) {
+                const double f = f_of(brdf, list[m], wi, wo)[0], density = brdf.pdf(wo, wi);
+                EXPECT_TRUE(std::isfinite(f) && f >= 0) << m << " at " << theta_deg << ": " << f;
+                EXPECT_TRUE(std::isfinite(density) && density >= 0)
+                    << m << " at " << theta_deg << ": " << density;
+            }
+            const double albedo = directional_albedo(list[m], wo, 40)[0];
+            EXPECT_TRUE(albedo >= 0 && albedo <= 1.002) << m << " at " << theta_deg << ": " << albedo;
+        }
+    }
+}
+
 TEST(FacetBrdf, MirrorsHaveNoDensity) {
     const Material gold({"y"}, Mirror{{{}, 0.43, 2.455}});
     const FacetBrdf brdf(gold, slope, 0, 0, 0);
