@@ -38,6 +38,8 @@ json canonical(const BrdfPlan& plan) {
            {"accuracy", canonical(plan.accuracy)}};
     if (!plan.pairs.empty()) j["pairs"] = plan.pairs;
     if (plan.transport != TransportKind::automatic) j["transport"] = static_cast<int>(plan.transport);
+    for (const ReceiverCell& c : plan.outgoing_cells)
+        j["cells"].push_back({c.theta_min_deg, c.theta_max_deg, c.phi_min_deg, c.phi_max_deg});
     return j;
 }
 

@@ -109,6 +109,19 @@ const std::vector<DirectionForm> direction_forms = {
      }},
 };
 
+// Receivers: {"cells": "klems_full"} or {"cells": {"equal": N}}.
+std::vector<ReceiverCell> parse_cells(const JsonNode& outgoing) {
+    outgoing.allow_keys({"cells"});
+    const JsonNode node = outgoing.at("cells");
+    if (node.raw().is_string()) {
+        node.choice({"klems_full"});
+        return klems_full_cells();
+    }
+    if (!node.raw().is_object()) node.refuse(R"(must be "klems_full" or {"equal": N})");
+    node.allow_keys({"equal"});
+    return equal_cells(static_cast<int>(node.at("equal").whole_number(1, max_directions)));
+}
+
 void parse_pairs(const JsonNode& node, BrdfPlan& plan) {
     const std::vector<double> angles = node.number_rows(4);
     DirectionIndex incident, outgoing;
@@ -127,6 +140,8 @@ void parse_pairs(const JsonNode& node, BrdfPlan& plan) {
 }  // namespace
 
 std::vector<AnglesDeg> parse_directions(const JsonNode& node) {
+    if (const auto cells = node.find("cells"))
+        cells->refuse(R"(receivers of finite size stand under "outgoing" of a brdf only)");
     for (const DirectionForm& form : direction_forms) {
         if (node.has(form.key)) return form.parse(node);
     }
@@ -144,7 +159,12 @@ void parse_direction_pairs(const JsonNode& measure, BrdfPlan& plan) {
         return;
     }
     plan.incident = parse_directions(measure.at("incident"));
-    plan.outgoing = parse_directions(measure.at("outgoing"));
+    if (const JsonNode outgoing = measure.at("outgoing"); outgoing.has("cells")) {
+        plan.outgoing_cells = parse_cells(outgoing);
+        plan.outgoing = centres(plan.outgoing_cells);
+    } else {
+        plan.outgoing = parse_directions(outgoing);
+    }
 }
 
 }  // namespace gonio

@@ -67,6 +67,7 @@ BrdfResult empty_result(const Material& material, const BrdfPlan& plan) {
     result.table.incident = plan.incident;
     result.table.outgoing = plan.outgoing;
     result.table.pairs = plan.pairs;
+    result.table.cells = plan.outgoing_cells;
     result.table.channels = material.channels;
     return result;
 }
@@ -124,7 +125,7 @@ BrdfResult measure_brdf(const HeightField& surface, const Material& material, co
         scene.allow_skips = options.allow_skips;
         // Two runs fit side by side. A share by threads would cut a job differently on other machines.
         scene.max_bytes = static_cast<long long>(0.4 * static_cast<double>(options.max_bytes));
-        if (options.allow_skips) scene.view_to_light = match_views(plan);
+        if (options.allow_skips && plan.outgoing_cells.empty()) scene.view_to_light = match_views(plan);
         if (!scene.view_to_light.empty())
             report.skipped.push_back({"half of the directions", "lights and views are the same set"});
         const std::unique_ptr<Transport> transport = make_transport(scene, report);

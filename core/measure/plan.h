@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "directions/cells.h"
 #include "directions/direction.h"
 #include "material/material.h"
 #include "measure/shards.h"
@@ -60,6 +61,7 @@ struct ProjectionPlan {
 struct BrdfPlan {
     std::vector<AnglesDeg> incident, outgoing;  // as in Table
     std::vector<std::pair<int, int>> pairs;     // as in Table: empty for the full product
+    std::vector<ReceiverCell> outgoing_cells;   // as Table::cells: empty for point directions
     int max_order = 0;                          // 0: all orders; K: orders 1..K only
     bool separate_orders = false;               // K slices of single orders beside the sum
     TransportKind transport = TransportKind::automatic;

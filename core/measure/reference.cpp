@@ -62,6 +62,10 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
                              const ReferenceOptions& reference, const RunOptions& options,
                              const Monitor& monitor) {
     validate(material, surface.nx, surface.ny);
+    if (!plan.outgoing_cells.empty())
+        throw Error(ErrorCode::invalid_input, "/measure/outgoing/cells",
+                    std::to_string(plan.outgoing_cells.size()) + " cells",
+                    "the path tracer answers single directions");
     if (has_mirror(material))
         throw Error(
             ErrorCode::invalid_input, "/measure/outgoing", "directions",

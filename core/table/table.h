@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "directions/cells.h"
 #include "directions/direction.h"
 
 namespace gonio {
@@ -14,6 +15,9 @@ struct Table {
     std::vector<AnglesDeg> incident, outgoing;  // unique directions, in the order of the job
     // Empty: the full product, row = i * outgoing.size() + o. Else row r is (incident[pairs[r].first], outgoing[pairs[r].second]).
     std::vector<std::pair<int, int>> pairs;
+    // Not empty: outgoing[o] is the centre of the receiver cells[o], and f the mean over it weighted by the cosine: cell flux /
+    // (E0 * projected solid angle).
+    std::vector<ReceiverCell> cells;
     std::vector<std::string> channels;          // "y", "r", ..., "450nm"
     // orders == 0: only the sum of all orders. orders == K: slices 0..K, slice 0 the sum of all, slice k the k-th order alone.
     int orders = 0;

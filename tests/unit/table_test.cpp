@@ -78,10 +78,20 @@ Table pair_table(int orders) {
     return table;
 }
 
+Table cell_table(int orders) {
+    Table table = product_table(orders, {"y"});
+    table.cells = equal_cells(9);
+    table.outgoing = centres(table.cells);
+    table.f.clear(), table.se.clear(), table.bias.clear();
+    fill(table);
+    return table;
+}
+
 void expect_equal(const Table& a, const Table& b) {
     EXPECT_EQ(a.incident, b.incident);
     EXPECT_EQ(a.outgoing, b.outgoing);
     EXPECT_EQ(a.pairs, b.pairs);
+    EXPECT_EQ(a.cells, b.cells);
     EXPECT_EQ(a.channels, b.channels);
     EXPECT_EQ(a.orders, b.orders);
     EXPECT_EQ(a.f, b.f);
@@ -93,7 +103,7 @@ void expect_equal(const Table& a, const Table& b) {
 TEST_F(TableFiles, TextFormatsReadBackBitEqual) {
     for (const std::string format : {"csv", "json"}) {
         for (const Table& table : {product_table(0, {"y"}), product_table(3, {"450nm", "550.5nm"}),
-                                   pair_table(0), pair_table(2)}) {
+                                   pair_table(0), pair_table(2), cell_table(0), cell_table(2)}) {
             SCOPED_TRACE(format);
             write_table(table, format, path("t." + format));
             expect_equal(read_table(path("t." + format)), table);
@@ -130,6 +140,24 @@ TEST_F(TableFiles, CsvIsTheDocumentedText) {
               "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,f_y,se_y,bias_y\n"
               "30,0,0,0,0.25,0.5,0\n"
               "30,0,45,180,0.1,1e-09,2\n");
+}
+
+TEST_F(TableFiles, CsvOfCellsTellsBoundsAndSizes) {
+    Table table;
+    table.incident = {{30, 0}};
+    table.cells = equal_cells(1);
+    table.outgoing = centres(table.cells);
+    table.channels = {"y"};
+    table.f = {0.25f}, table.se = {0.5f}, table.bias = {0};
+    std::ostringstream out;
+    write_csv(table, out);
+    const std::string text = out.str();
+    EXPECT_NE(text.find("weighted by the cosine"), std::string::npos);
+    EXPECT_EQ(text.substr(text.find("\ntheta") + 1),
+              "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg,theta_o_min_deg,theta_o_max_deg,phi_o_min_deg,phi_"
+              "o_max_deg,"
+              "solid_angle_o_sr,projected_solid_angle_o_sr,f_y,se_y,bias_y\n"
+              "30,0,0,0,0,90,0,360,6.283185307179585,3.141592653589793,0.25,0.5,0\n");
 }
 
 // What readers in other languages do: parse a double, round to float.
@@ -384,6 +412,11 @@ TEST(TableValidate, RefusesWhatIsNoTable) {
     refused([](Table& t) { t.channels[0] = "a,b"; });
     refused([](Table& t) { t.channels.clear(); });
     refused([](Table& t) { t.orders = -1; });
+    refused([](Table& t) { t.cells = equal_cells(static_cast<int>(t.outgoing.size()) + 1); });
+    refused([](Table& t) {
+        t.cells = equal_cells(static_cast<int>(t.outgoing.size()));
+        t.cells[0].theta_max_deg = t.cells[0].theta_min_deg;
+    });
     refused([](Table& t) { t.pairs.assign(t.rows(), {0, 99}); });
 }
 

@@ -10,6 +10,10 @@ namespace gonio {
 namespace {
 
 constexpr std::string_view angle_columns = "theta_i_deg,phi_i_deg,theta_o_deg,phi_o_deg";
+// Behind them if the outgoing directions are cells.
+constexpr std::string_view cell_columns =
+    ",theta_o_min_deg,theta_o_max_deg,phi_o_min_deg,phi_o_max_deg,solid_angle_o_sr,projected_solid_angle_o_"
+    "sr";
 
 // Provenance is one line a key: line ends, backslashes and a key's colons are escaped so that they read back.
 std::string escape(std::string_view text, bool is_key) {
@@ -58,6 +62,16 @@ std::vector<std::string> angle_texts(const std::vector<AnglesDeg>& directions) {
     return texts;
 }
 
+std::string cell_text(const ReceiverCell& cell) {
+    std::string text;
+    for (const double value : {cell.theta_min_deg, cell.theta_max_deg, cell.phi_min_deg, cell.phi_max_deg,
+                               solid_angle(cell), projected_solid_angle(cell)}) {
+        append_number(text, value);
+        text += ',';
+    }
+    return text;
+}
+
 }  // namespace
 
 void write_csv(const Table& table, std::ostream& out) {
@@ -65,6 +79,7 @@ void write_csv(const Table& table, std::ostream& out) {
     writer.text() += "# gonio table, version " + std::to_string(table_format_version) + "\n";
     for (const std::string_view line : table_conventions)
         writer.text().append("# ").append(line).append("\n");
+    if (!table.cells.empty()) writer.text().append("# ").append(cell_convention).append("\n");
     if (table.orders > 0)
         writer.text() += "# order: 0 is the sum of all orders, k the k-th order of scattering alone\n";
     writer.text() += "# provenance\n";
@@ -72,13 +87,15 @@ void write_csv(const Table& table, std::ostream& out) {
         writer.text() += "# " + escape(key, true) + ": " + escape(value, false) + "\n";
 
     writer.text() += angle_columns;
+    if (!table.cells.empty()) writer.text() += cell_columns;
     if (table.orders > 0) writer.text() += ",order";
     for (const std::string& name : table.channels)
         writer.text() += ",f_" + name + ",se_" + name + ",bias_" + name;
     writer.text() += "\n";
 
-    const std::vector<std::string> incident = angle_texts(table.incident),
-                                   outgoing = angle_texts(table.outgoing);
+    const std::vector<std::string> incident = angle_texts(table.incident);
+    std::vector<std::string> outgoing = angle_texts(table.outgoing);
+    for (size_t o = 0; o < table.cells.size(); ++o) outgoing[o] += cell_text(table.cells[o]);
     for (size_t row = 0; row < table.rows(); ++row) {
         const auto [i, o] = table.pair(row);
         for (size_t slice = 0; slice < table.slices(); ++slice) {
@@ -199,14 +216,21 @@ void read_comments(CsvReader& reader, Table& table) {
     reader.refuse("", "the file ends before the header " + std::string(angle_columns));
 }
 
-// Fills channels; true if there is a column of orders.
-bool read_header(const CsvReader& reader, Table& table) {
+struct Header {
+    bool has_cells = false, has_orders = false;
+};
+
+// Fills channels.
+Header read_header(const CsvReader& reader, Table& table) {
     std::string_view header = reader.line();
     if (!header.starts_with(angle_columns))
         reader.refuse("", "the header must begin with " + std::string(angle_columns));
     header.remove_prefix(angle_columns.size());
-    const bool has_orders = header.starts_with(",order,");
-    if (has_orders) header.remove_prefix(6);
+    Header found;
+    found.has_cells = header.starts_with(cell_columns);
+    if (found.has_cells) header.remove_prefix(cell_columns.size());
+    found.has_orders = header.starts_with(",order,");
+    if (found.has_orders) header.remove_prefix(6);
     while (!header.empty()) {
         if (!header.starts_with(",f_"))
             reader.refuse("\"" + std::string(header.substr(0, 40)) + "\"", "expected ,f_NAME");
@@ -221,7 +245,7 @@ bool read_header(const CsvReader& reader, Table& table) {
         table.channels.push_back(name);
     }
     if (table.channels.empty()) reader.refuse("", "the table has no channel");
-    return has_orders;
+    return found;
 }
 
 // The rows are a full product if they run through every outgoing direction for each incident one, in order.
@@ -252,7 +276,7 @@ Table parse_csv(std::string_view text, const std::string& name) {
     Table table;
     CsvReader reader(text, name);
     read_comments(reader, table);
-    const bool has_orders = read_header(reader, table);
+    const auto [has_cells, has_orders] = read_header(reader, table);
     const size_t n_values = 3 * table.channels.size();
 
     std::vector<float> values;
@@ -267,6 +291,15 @@ Table parse_csv(std::string_view text, const std::string& name) {
         wo.theta_deg = reader.number<double>();
         wo.phi_deg = reader.number<double>();
         const std::pair<int, int> pair(incident(wi), outgoing(wo));
+        if (has_cells) {
+            ReceiverCell cell;
+            for (double* bound :
+                 {&cell.theta_min_deg, &cell.theta_max_deg, &cell.phi_min_deg, &cell.phi_max_deg})
+                *bound = reader.number<double>();
+            for (int k = 0; k < 2; ++k) reader.number<double>();  // the solid angles follow from the bounds
+            if (table.cells.size() < table.outgoing.size()) table.cells.push_back(cell);
+            if (cell != table.cells[pair.second]) reader.refuse("", "two cells have the same centre");
+        }
         if (has_orders) {
             const int order = reader.number<int>();
             if (order == 0 && slice > 0 && last_slice < 0) last_slice = slice - 1, slice = 0;

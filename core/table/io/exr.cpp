@@ -5,11 +5,13 @@
 // its companions `i000.stdErr.R` and `i000.bias.R` (`i000.order1.R` and so on for single orders) and the
 // string attributes `i000.thetaI`, `i000.phiI`. The image is the set of outgoing directions in the order of
 // the job, never resampled: rows theta and columns phi if the set is such a grid, else wrapped to the divisor
-// of its size nearest the square. The channels `thetaO` and `phiO` tell each pixel's direction. Beyond that
-// number of channels (the header would grow to megabytes) the images of all incident directions stand below
-// each other in one layer without a name, and the channels `thetaI`, `phiI` join in: attribute `layout` =
-// "stacked". A list of pairs is a wrapped image with all four channels of angles: `layout` = "pairs". Names:
-// r g b y become R G B Y, "450.5nm" becomes "450,5nm" (a dot would split the layer's name).
+// of its size nearest the square. The channels `thetaO` and `phiO` tell each pixel's direction; where it
+// is the centre of a cell, `thetaOMin`, `thetaOMax`, `phiOMin`, `phiOMax` tell the bounds in degrees,
+// `solidAngleO` and `projectedSolidAngleO` its size in sr. Beyond that number of channels (the header would
+// grow to megabytes) the images of all incident directions stand below each other in one layer without a
+// name, and the channels `thetaI`, `phiI` join in: attribute `layout` = "stacked". A list of pairs is a
+// wrapped image with all four channels of angles: `layout` = "pairs". Names: r g b y become R G B Y,
+// "450.5nm" becomes "450,5nm" (a dot would split the layer's name).
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
 #include <ImfHeader.h>
@@ -110,9 +112,29 @@ void add_layer(Picture& picture, const Table& table, const std::string& prefix, 
     }
 }
 
+// Bounds and size of each pixel's cell; nothing for point directions.
+std::vector<std::pair<std::string, std::vector<float>>> cell_pixels(const Table& table, size_t pixels) {
+    if (table.cells.empty()) return {};
+    std::vector<std::pair<std::string, std::vector<float>>> channels;
+    auto add = [&](const char* name, auto&& value_of) {
+        std::vector<float> values(pixels);
+        for (size_t row = 0; row < pixels; ++row)
+            values[row] = static_cast<float>(value_of(table.cells[table.pair(row).second]));
+        channels.emplace_back(name, std::move(values));
+    };
+    add("thetaOMin", [](const ReceiverCell& c) { return c.theta_min_deg; });
+    add("thetaOMax", [](const ReceiverCell& c) { return c.theta_max_deg; });
+    add("phiOMin", [](const ReceiverCell& c) { return c.phi_min_deg; });
+    add("phiOMax", [](const ReceiverCell& c) { return c.phi_max_deg; });
+    add("solidAngleO", solid_angle);
+    add("projectedSolidAngleO", projected_solid_angle);
+    return channels;
+}
+
 void add_provenance(Picture& picture, const Table& table, const std::string& parameterisation) {
     std::string comments;
     for (const std::string_view line : table_conventions) comments.append(line).append("\n");
+    if (!table.cells.empty()) comments.append(cell_convention).append("\n");
     for (const auto& [key, value] : table.provenance) {
         comments += key + ": " + value + "\n";
         // OpenEXR allows 255 bytes in a name; the comments carry the key in full.
@@ -155,6 +177,8 @@ void write_exr(const Table& table, const std::string& path) {
         }
         picture.channel("thetaO", theta_o.data());
         picture.channel("phiO", phi_o.data());
+        const std::vector<std::pair<std::string, std::vector<float>>> bounds = cell_pixels(table, pixels);
+        for (const auto& [name, values] : bounds) picture.channel(name, values.data());
         if (is_layered) {
             for (size_t i = 0; i < table.incident.size(); ++i) {
                 const std::string layer = layer_name(i, table.incident.size()) + ".";

@@ -21,6 +21,12 @@ inline constexpr std::string_view table_conventions[] = {
     "se: standard error (one sigma) of f in 1/sr; bias: estimate of what the standard error cannot see, in "
     "1/sr",
 };
+// Said beside them if the table has cells.
+inline constexpr std::string_view cell_convention =
+    "cells: outgoing directions are the centres of receivers with bounds in theta and phi; f is the mean "
+    "over the cell, "
+    "weighted by the cosine: flux into the cell / (irradiance of the mean plane * projected solid angle of "
+    "the cell)";
 
 void write_csv(const Table& table, std::ostream& out);
 void write_json(const Table& table, std::ostream& out);

@@ -24,6 +24,21 @@ nlohmann::ordered_json direction_axis(const std::string& name, const std::vector
     return {{"name", name}, {"unit", "deg"}, {"columns", {"theta", "phi"}}, {"values", std::move(values)}};
 }
 
+// The outgoing axis of a table over cells has, beside its centres, their bounds and sizes.
+nlohmann::ordered_json cell_member(const std::vector<ReceiverCell>& cells) {
+    nlohmann::ordered_json bounds = nlohmann::ordered_json::array(), sizes = bounds, projected = bounds;
+    for (const ReceiverCell& c : cells) {
+        bounds.push_back({c.theta_min_deg, c.theta_max_deg, c.phi_min_deg, c.phi_max_deg});
+        sizes.push_back(solid_angle(c));
+        projected.push_back(projected_solid_angle(c));
+    }
+    return {{"unit", "deg"},
+            {"columns", {"theta_min", "theta_max", "phi_min", "phi_max"}},
+            {"values", std::move(bounds)},
+            {"solid_angle_sr", std::move(sizes)},
+            {"projected_solid_angle_sr", std::move(projected)}};
+}
+
 nlohmann::ordered_json order_axis(const Table& table) {
     std::vector<int> values;
     for (int k = 0; k <= table.orders; ++k) values.push_back(k);
@@ -39,12 +54,14 @@ nlohmann::ordered_json head(const Table& table) {
     root["version"] = table_format_version;
     root["quantity"] = {{"name", "f"}, {"meaning", "BRDF f_r, no cosine inside"}, {"unit", "1/sr"}};
     for (const std::string_view line : table_conventions) root["conventions"].push_back(line);
+    if (!table.cells.empty()) root["conventions"].push_back(cell_convention);
     root["provenance"] = nlohmann::ordered_json::array();
     for (const auto& [key, value] : table.provenance) root["provenance"].push_back({key, value});
     root["axes"] = {{{"name", "channel"}, {"unit", ""}, {"values", table.channels}},
                     order_axis(table),
                     direction_axis("incident", table.incident),
                     direction_axis("outgoing", table.outgoing)};
+    if (!table.cells.empty()) root["axes"].back()["cells"] = cell_member(table.cells);
     root["shape"] = {table.channels.size(), table.slices()};
     if (table.pairs.empty()) {
         root["pairs"] = nullptr;
@@ -114,20 +131,38 @@ class JsonReader {
         }
         return values;
     }
-    const Json& axis(const std::string& axis_name) const {
+    const Json& axis_object(const std::string& axis_name) const {
         for (const Json& candidate : member("axes", Json::value_t::array)) {
             if (!candidate.is_object() || candidate.value("name", Json()) != axis_name) continue;
             const auto values = candidate.find("values");
-            if (values != candidate.end() && values->is_array()) return *values;
+            if (values != candidate.end() && values->is_array()) return candidate;
         }
         refuse("/axes", axis_name, "an axis of this name with an array of values is needed");
     }
+    const Json& axis(const std::string& axis_name) const { return axis_object(axis_name)["values"]; }
     std::vector<AnglesDeg> directions(const std::string& axis_name) const {
         std::vector<AnglesDeg> list;
         for (const Json& a : axis(axis_name)) {
             if (!a.is_array() || a.size() != 2 || !a[0].is_number() || !a[1].is_number())
                 refuse("/axes/" + axis_name, a.dump().substr(0, 40), "[theta, phi] in degrees is needed");
             list.push_back({a[0].get<double>(), a[1].get<double>()});
+        }
+        return list;
+    }
+    std::vector<ReceiverCell> cells() const {
+        const Json& outgoing = axis_object("outgoing");
+        const auto found = outgoing.find("cells");
+        if (found == outgoing.end()) return {};
+        const Json bounds = found->is_object() ? found->value("values", Json()) : Json();
+        if (!bounds.is_array())
+            refuse("/axes/outgoing/cells", "", "an object with an array of values is needed");
+        std::vector<ReceiverCell> list;
+        for (const Json& b : bounds) {
+            if (!b.is_array() || b.size() != 4 || !b[0].is_number() || !b[1].is_number() ||
+                !b[2].is_number() || !b[3].is_number())
+                refuse("/axes/outgoing/cells", b.dump().substr(0, 40),
+                       "[theta_min, theta_max, phi_min, phi_max] in degrees is needed");
+            list.push_back({b[0].get<double>(), b[1].get<double>(), b[2].get<double>(), b[3].get<double>()});
         }
         return list;
     }
@@ -172,6 +207,7 @@ Table parse_json(std::string_view text, const std::string& name) {
     table.orders = static_cast<int>(slices) - 1;
     table.incident = reader.directions("incident");
     table.outgoing = reader.directions("outgoing");
+    table.cells = reader.cells();
     if (root.contains("pairs") && !root["pairs"].is_null()) {
         for (const Json& pair : reader.member("pairs", Json::value_t::array)) {
             if (!pair.is_array() || pair.size() != 2)

@@ -46,6 +46,17 @@ void check_angles(const std::vector<AnglesDeg>& directions, const std::string& m
             refuse(member, "not finite", "finite angles");
 }
 
+void check_cells(const Table& table) {
+    if (table.cells.empty()) return;
+    if (table.cells.size() != table.outgoing.size())
+        refuse("cells", std::to_string(table.cells.size()) + " cells", "as many as outgoing directions");
+    for (const ReceiverCell& c : table.cells)
+        if (!(c.theta_min_deg >= 0 && c.theta_min_deg < c.theta_max_deg && c.theta_max_deg <= 90) ||
+            !std::isfinite(c.phi_min_deg) || !std::isfinite(c.phi_max_deg) ||
+            !(c.phi_min_deg < c.phi_max_deg))
+            refuse("cells", "bounds", "0 <= theta_min < theta_max <= 90 and finite phi_min < phi_max");
+}
+
 void check_values(const Table& table, const std::vector<float>& values, const std::string& member) {
     const size_t expected = table.channels.size() * table.slices() * table.rows();
     if (values.size() != expected) {
@@ -62,6 +73,7 @@ void check_values(const Table& table, const std::vector<float>& values, const st
 void validate(const Table& table) {
     check_angles(table.incident, "incident");
     check_angles(table.outgoing, "outgoing");
+    check_cells(table);
     for (const auto& [i, o] : table.pairs) {
         if (i < 0 || o < 0 || static_cast<size_t>(i) >= table.incident.size() ||
             static_cast<size_t>(o) >= table.outgoing.size()) {

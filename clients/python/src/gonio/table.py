@@ -14,6 +14,8 @@ Floats = npt.NDArray[np.float32]
 ANGLES = ("theta_i", "phi_i", "theta_o", "phi_o")
 # Axes whose points are several angles at once, and which.
 LISTS = {"incident": ANGLES[:2], "outgoing": ANGLES[2:], "pair": ANGLES}
+# Coordinates of "outgoing" where it stands for cells: bounds in degrees and size in sr.
+CELLS = ("theta_o_min", "theta_o_max", "phi_o_min", "phi_o_max", "solid_angle_o", "projected_solid_angle_o")
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class Table:
         (0: their sum, k: the k-th alone).
     values, standard_error, bias: float32, one element a point. `error` combines the last two.
     coords: name -> values. Of an axis, along that axis; theta_i and phi_i of an axis "incident" along that one, and
-        so on. Angles are in degrees: theta from the normal, phi from +x (columns) to +y (rows), both away from the
+        so on; of receiver cells, whose centres those are, also the bounds theta_o_min, theta_o_max, phi_o_min, phi_o_max
+        and the sizes solid_angle_o, projected_solid_angle_o. Angles are in degrees: theta from the normal, phi from +x (columns) to +y (rows), both away from the
         surface.
     units: name -> unit, of coords and of "values".
     provenance: what made it: program, job_hash, surface_hash, seed, settings.
@@ -71,7 +74,7 @@ class Table:
 
     def _take(self, axis: str, index: int) -> Table:
         number = self.dims.index(axis)
-        gone = {axis, *LISTS.get(axis, ())}
+        gone = {axis, *LISTS.get(axis, ()), *(CELLS if axis == "outgoing" else ())}
         arrays = {name: getattr(self, name).take(index, number) for name in ("values", "standard_error", "bias")}
         return replace(self, dims=self.dims[:number] + self.dims[number + 1:], **arrays,
                        coords={name: values for name, values in self.coords.items() if name not in gone})
@@ -79,18 +82,19 @@ class Table:
 
 def make_table(stored: Sequence[Floats], channels: Sequence[str], n_orders: int, incident: npt.NDArray[np.float64],
                outgoing: npt.NDArray[np.float64], pairs: npt.NDArray[np.intp] | None, unit: str,
-               provenance: Mapping[str, str]) -> Table:
+               provenance: Mapping[str, str], cells: npt.NDArray[np.float64] | None = None) -> Table:
     """A table from arrays as files hold them.
 
     stored: values, standard errors, biases, flat, in the order [channel][order][incident][outgoing] or
         [channel][order][pair]. incident, outgoing: rows of theta, phi in degrees. pairs: rows of an index of each.
+        cells: rows of CELLS, one an outgoing direction.
     """
     coords: dict[str, npt.NDArray[Any]] = {}
     dims: tuple[str, ...] = ()
     extents: tuple[int, ...] = ()
     if pairs is None:
         for axis, angles, directions in (("incident", ANGLES[:2], incident), ("outgoing", ANGLES[2:], outgoing)):
-            grid = _grid(directions)
+            grid = _grid(directions) if axis == "incident" or cells is None else None
             dims += angles if grid else (axis,)
             extents += (len(grid[0]), len(grid[1])) if grid else (len(directions),)
             coords |= zip(angles, grid or directions.T)
@@ -99,6 +103,10 @@ def make_table(stored: Sequence[Floats], channels: Sequence[str], n_orders: int,
             raise InvalidTable("pairs: an index is beyond the directions")
         dims, extents = ("pair",), (len(pairs),)
         coords |= zip(ANGLES, (*incident[pairs[:, 0]].T, *outgoing[pairs[:, 1]].T))
+    if cells is not None:
+        if cells.shape != (len(outgoing), len(CELLS)):
+            raise InvalidTable(f"{len(cells)} cells: there are {len(outgoing)} outgoing directions")
+        coords |= zip(CELLS, cells.T if pairs is None else cells[pairs[:, 1]].T)
     coords["channel"] = np.array(channels)
     shape = (len(channels), n_orders, *extents)
     arrays = []
@@ -113,6 +121,8 @@ def make_table(stored: Sequence[Floats], channels: Sequence[str], n_orders: int,
     else:
         arrays = [array[..., 0] for array in arrays]
     units = {"values": unit, **{name: "deg" for name in ANGLES}}
+    if cells is not None:
+        units |= {name: "sr" if "solid" in name else "deg" for name in CELLS}
     return Table(dims, arrays[0], arrays[1], arrays[2], coords, units, provenance)
 
 

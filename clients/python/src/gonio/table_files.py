@@ -15,6 +15,8 @@ from .errors import InvalidTable
 from .table import Table, make_table
 
 VERSION = 1
+CELL_COLUMNS = ["theta_o_min_deg", "theta_o_max_deg", "phi_o_min_deg", "phi_o_max_deg", "solid_angle_o_sr",
+                "projected_solid_angle_o_sr"]
 
 
 def read_table(path: str | os.PathLike[str]) -> Table:
@@ -50,8 +52,11 @@ def _parse_json(content: bytes) -> Table:
     axes = {axis["name"]: axis["values"] for axis in root["axes"]}
     pairs = None if root.get("pairs") is None else np.array(root["pairs"], dtype=np.intp).reshape(-1, 2)
     stored = [np.array(root[name], dtype=np.float32) for name in ("values", "standard_error", "bias")]
+    cells = next((axis["cells"] for axis in root["axes"] if axis["name"] == "outgoing" and "cells" in axis), None)
+    bounds = None if cells is None else np.column_stack(
+        [np.reshape(cells["values"], (-1, 4)), cells["solid_angle_sr"], cells["projected_solid_angle_sr"]])
     return make_table(stored, axes["channel"], len(axes["order"]), _directions(axes["incident"]),
-                      _directions(axes["outgoing"]), pairs, root["quantity"]["unit"], dict(root["provenance"]))
+                      _directions(axes["outgoing"]), pairs, root["quantity"]["unit"], dict(root["provenance"]), bounds)
 
 
 def _directions(values: list[list[float]]) -> npt.NDArray[np.float64]:
@@ -65,8 +70,9 @@ def _parse_csv(content: bytes) -> Table:
     _check_version(int(lines[0].rsplit(" ", 1)[1]))
     n_comments = next(k for k, line in enumerate([*lines, ""]) if not line.startswith("#"))
     columns = lines[n_comments].split(",") if n_comments < len(lines) else []
-    has_orders = columns[4:5] == ["order"]
-    first = 5 if has_orders else 4
+    directions = 4 + len(CELL_COLUMNS) if columns[4:4 + len(CELL_COLUMNS)] == CELL_COLUMNS else 4
+    has_orders = columns[directions:directions + 1] == ["order"]
+    first = directions + has_orders
     channels = [name.removeprefix("f_") for name in columns[first::3]]
     expected = [f"{kind}_{name}" for name in channels for kind in ("f", "se", "bias")]
     if columns[:4] != ["theta_i_deg", "phi_i_deg", "theta_o_deg", "phi_o_deg"] or not channels \
@@ -75,16 +81,18 @@ def _parse_csv(content: bytes) -> Table:
     data = np.loadtxt(io.StringIO("\n".join(lines[n_comments + 1:])), delimiter=",", ndmin=2)
     if data.shape[1:] != (len(columns),):
         raise InvalidTable(f"the rows have {data.shape[1:]} values: the header has {len(columns)}")
-    n_orders = int(data[:, 4].max()) + 1 if has_orders else 1
+    n_orders = int(data[:, directions].max()) + 1 if has_orders else 1
     # [row][channel][value, se, bias] of rows that run through the orders of each pair
-    cells = data[:, first:].reshape(-1, n_orders, len(channels), 3)
-    stored = [cells[..., k].transpose(2, 1, 0).astype(np.float32).ravel() for k in range(3)]
+    values = data[:, first:].reshape(-1, n_orders, len(channels), 3)
+    stored = [values[..., k].transpose(2, 1, 0).astype(np.float32).ravel() for k in range(3)]
     incident, i = _distinct(data[::n_orders, 0:2])
-    outgoing, o = _distinct(data[::n_orders, 2:4])
+    outgoing, o = _distinct(data[::n_orders, 2:directions])
+    cells = outgoing[:, 2:] if directions > 4 else None
     pairs: npt.NDArray[np.intp] | None = np.stack([i, o], axis=1)
     if np.array_equal(i * len(outgoing) + o, np.arange(len(incident) * len(outgoing))):
         pairs = None
-    return make_table(stored, channels, n_orders, incident, outgoing, pairs, "1/sr", _provenance(lines[:n_comments]))
+    return make_table(stored, channels, n_orders, incident, outgoing[:, :2], pairs, "1/sr",
+                      _provenance(lines[:n_comments]), cells)
 
 
 def _distinct(rows: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.intp]]:
