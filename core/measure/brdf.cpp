@@ -122,6 +122,7 @@ BrdfResult measure_brdf(const HeightField& surface, const Material& material, co
         scene.lights = vectors_of(plan.incident, simple.axes_swapped);
         scene.views = vectors_of(plan.outgoing, simple.axes_swapped);
         scene.groups = row_groups(result.table);
+        scene.axes_swapped = simple.axes_swapped;
         scene.allow_skips = options.allow_skips;
         // Two runs fit side by side. A share by threads would cut a job differently on other machines.
         scene.max_bytes = static_cast<long long>(0.4 * static_cast<double>(options.max_bytes));

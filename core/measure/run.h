@@ -38,6 +38,7 @@ struct RunSettings {
     int directions = 64;  // shared directions of the operator
     int refinement = 1;
     int tiles_x = 0, tiles_y = 0;  // windows per run; 0: the whole period at once
+    int block_step = 1;            // forward tracing starts from one of so many blocks of cells
     bool operator==(const RunSettings&) const = default;
 };
 

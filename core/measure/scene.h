@@ -19,7 +19,9 @@ struct MeasuredScene {
     // views[v] == lights[view_to_light[v]] for all v, and every light is a view: half the work. Empty
     // otherwise.
     std::vector<int> view_to_light;
-    RowGroups groups;         // of the table's rows
+    RowGroups groups;  // of the table's rows
+    bool axes_swapped =
+        false;  // of the surface against the plan's directions (simplify.h); lights, views are turned already
     bool allow_skips = true;  // as in RunOptions
     long long max_bytes = 0;  // for one run
 

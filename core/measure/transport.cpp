@@ -1,6 +1,9 @@
 #include "measure/transport.h"
 
+#include <algorithm>
+
 #include "measure/diffuse_transport.h"
+#include "measure/forward_transport.h"
 
 namespace gonio {
 namespace {
@@ -12,8 +15,14 @@ struct Choice {
 
 Choice choose(const MeasuredScene& scene) {
     if (scene.plan->transport != TransportKind::automatic) return {scene.plan->transport, "asked for"};
+    if (!scene.plan->outgoing_cells.empty()) return {TransportKind::forward, "the receivers are cells"};
     if (pure_lambertian(*scene.material)) return {TransportKind::diffuse, "all facets are Lambertian"};
     return {TransportKind::pair_graph, "facets are glossy"};
+}
+
+bool has_mirror(const Material& material) {
+    return std::any_of(material.lobes.begin(), material.lobes.end(),
+                       [](const WeightedLobe& part) { return std::holds_alternative<Mirror>(part.lobe); });
 }
 
 const char* name_of(TransportKind kind) {
@@ -42,11 +51,23 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
         throw Error(ErrorCode::invalid_input, "/base", "",
                     std::string("only the light of Lambertian facets is carried over a curved base, not by ") +
                         name_of(kind));
+    const std::string cells = R"({"cells": "klems_full"} or {"cells": {"equal": N}})";
+    if (scene.plan->outgoing_cells.empty() && has_mirror(*scene.material))
+        throw Error(ErrorCode::invalid_input, "/measure/outgoing", "directions",
+                    "a mirror's f is infinite or 0 at a direction: needs receivers of finite size, " + cells);
+    if (kind == TransportKind::forward && scene.plan->outgoing_cells.empty())
+        throw Error(ErrorCode::invalid_input, "/measure/transport", "forward",
+                    "needs \"outgoing\": receivers of finite size, " + cells);
+    if (kind != TransportKind::forward && !scene.plan->outgoing_cells.empty())
+        throw Error(ErrorCode::invalid_input, "/measure/transport", name_of(kind),
+                    "answers single directions: leave it to \"auto\", or ask for them in place of cells");
     report.settings.push_back({"transport", name_of(kind)});
     report.settings.push_back({"transport_why", why});
     switch (kind) {
         case TransportKind::diffuse:
             return std::make_unique<DiffuseTransport>(scene, *lambertian, report);
+        case TransportKind::forward:
+            return std::make_unique<ForwardTransport>(scene);
         default:
             throw Error(ErrorCode::invalid_input, "/measure/transport", name_of(kind), "is not there yet");
     }

@@ -10,46 +10,12 @@
 
 #include "surface/facet_mesh.h"
 #include "tests/bench/bench.h"
+#include "tests/bench/tiled_scene.h"
 #include "visibility/march.h"
 
 using namespace gonio;
 
 namespace {
-
-// 3 x 3 periods of triangles, in cells: what a careful user of Embree would build for these rays.
-struct TiledScene {
-    RTCDevice device = rtcNewDevice("threads=1");
-    RTCScene scene = rtcNewScene(device);
-    explicit TiledScene(const HeightField& s) {
-        const int n = 3 * s.nx + 1, m = 3 * s.ny + 1;
-        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_HIGH);
-        RTCGeometry mesh = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-        auto* v = static_cast<float*>(rtcSetNewGeometryBuffer(
-            mesh, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, static_cast<size_t>(n) * m));
-        for (int j = 0; j < m; ++j)
-            for (int i = 0; i < n; ++i) {
-                *v++ = static_cast<float>(i - s.nx);
-                *v++ = static_cast<float>(j - s.ny);
-                *v++ = static_cast<float>(s.at(i, j) / s.pitch_x);
-            }
-        auto* t =
-            static_cast<unsigned*>(rtcSetNewGeometryBuffer(mesh, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                                           12, static_cast<size_t>(2) * (n - 1) * (m - 1)));
-        for (int j = 0; j + 1 < m; ++j)
-            for (int i = 0; i + 1 < n; ++i) {
-                const unsigned a = j * n + i, b = a + 1, c = a + n, d = c + 1;
-                for (const unsigned k : {a, b, d, a, d, c}) *t++ = k;
-            }
-        rtcCommitGeometry(mesh);
-        rtcAttachGeometry(scene, mesh);
-        rtcReleaseGeometry(mesh);
-        rtcCommitScene(scene);
-    }
-    ~TiledScene() {
-        rtcReleaseScene(scene);
-        rtcReleaseDevice(device);
-    }
-};
 
 enum class Call { intersect8, occluded8, intersect16, occluded16 };
 
@@ -97,7 +63,7 @@ struct OccludedPacket16 {
     RTCRay16 ray;
 };
 
-long long embree(const TiledScene& scene, const HeightField& s, const Vec3& d, const FacetPoint& p,
+long long embree(const bench::TiledScene& scene, const HeightField& s, const Vec3& d, const FacetPoint& p,
                  Call call) {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -150,7 +116,7 @@ int main() {
     for (const int n : {128, 512, 1024}) {
         const HeightField s = bench::field(n, 0.7);
         const MarchGrid grid = make_march_grid(s);
-        const TiledScene scene(s);
+        const bench::TiledScene scene(s);
         for (const double theta_deg : {60.0, 80.0}) {
             const Vec3 d = to_vector({theta_deg, degrees(std::atan2(1, 2))});
             // Embree's best packet call, then every instruction set of the march, interleaved.

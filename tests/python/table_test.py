@@ -50,6 +50,17 @@ class Tables(unittest.TestCase):
         self.assertEqual((table.units["values"], table.units["theta_i"]), ("1/sr", "deg"))
         self.assertEqual(table.provenance["seed"], "1")
 
+    def test_cells(self):
+        table, rows = self.both({"incident": LIST, "outgoing": {"cells": {"equal": 5}}},
+                                material={"model": "mirror", "reflectance": 0.5})
+        self.assertEqual(table.dims, ("incident", "outgoing", "channel"))
+        np.testing.assert_array_equal(table.coords["theta_o_max"], rows["theta_o_max_deg"][:5])
+        np.testing.assert_allclose(table.coords["projected_solid_angle_o"], np.pi / 5, rtol=1e-12)
+        self.assertEqual((table.units["phi_o_min"], table.units["solid_angle_o"]), ("deg", "sr"))
+        leaving = table.values[:, :, 0] @ table.coords["projected_solid_angle_o"]
+        self.assertTrue(((leaving > 0.2) & (leaving <= 0.5 + 1e-6)).all(), leaving)
+        self.assertNotIn("theta_o_min", table.sel(theta_o=10, phi_o=0).coords)
+
     def test_lists_orders_and_channels(self):
         table, rows = self.both({"incident": LIST, "outgoing": GRID, "orders": "separate", "max_order": 2},
                                 material={"model": "lambertian", "albedo": [0.2, 0.4, 0.8]})
