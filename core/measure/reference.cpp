@@ -17,23 +17,37 @@ double cpu_seconds() {
     return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
 }
 
-// The pairs of one view.
-struct View {
-    int outgoing = 0;
+// The pairs that one bundle of paths serves: of a view all lights, or of a light all cells.
+struct Bundle {
+    int start = 0;  // number of the view or light
     std::vector<size_t> rows;
     std::vector<Vec3> lights;
+    std::vector<ReceiverCell> cells;
 };
 
-std::vector<View> group_by_view(const Table& table) {
-    std::vector<View> views(table.outgoing.size());
-    for (size_t o = 0; o < views.size(); ++o) views[o].outgoing = static_cast<int>(o);
+std::vector<Bundle> bundles_of(const Table& table) {
+    const bool into_cells = !table.cells.empty();
+    std::vector<Bundle> bundles((into_cells ? table.incident : table.outgoing).size());
+    for (size_t k = 0; k < bundles.size(); ++k) bundles[k].start = static_cast<int>(k);
     for (size_t row = 0; row < table.rows(); ++row) {
         const auto [i, o] = table.pair(row);
-        views[o].rows.push_back(row);
-        views[o].lights.push_back(to_vector(table.incident[i]));
+        Bundle& bundle = bundles[into_cells ? i : o];
+        bundle.rows.push_back(row);
+        if (into_cells)
+            bundle.cells.push_back(table.cells[o]);
+        else
+            bundle.lights.push_back(to_vector(table.incident[i]));
     }
-    std::erase_if(views, [](const View& view) { return view.rows.empty(); });
-    return views;
+    std::erase_if(bundles, [](const Bundle& bundle) { return bundle.rows.empty(); });
+    return bundles;
+}
+
+PathTally trace(const PathTracer& tracer, const Table& table, const Bundle& bundle, int block,
+                const Monitor& monitor) {
+    const AnglesDeg& start = (table.cells.empty() ? table.outgoing : table.incident)[bundle.start];
+    return table.cells.empty()
+               ? tracer.trace(bundle.start, to_vector(start), bundle.lights, block, monitor)
+               : tracer.trace_into_cells(bundle.start, to_vector(start), bundle.cells, block, monitor);
 }
 
 bool has_mirror(const Material& material) {
@@ -62,11 +76,7 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
                              const ReferenceOptions& reference, const RunOptions& options,
                              const Monitor& monitor) {
     validate(material, surface.nx, surface.ny);
-    if (!plan.outgoing_cells.empty())
-        throw Error(ErrorCode::invalid_input, "/measure/outgoing/cells",
-                    std::to_string(plan.outgoing_cells.size()) + " cells",
-                    "the path tracer answers single directions");
-    if (has_mirror(material))
+    if (plan.outgoing_cells.empty() && has_mirror(material))
         throw Error(
             ErrorCode::invalid_input, "/measure/outgoing", "directions",
             R"(mirrors need receivers of finite size: {"cells": "klems_full"} or {"cells": {"equal": 64}})");
@@ -87,6 +97,7 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
     Table& table = result.table;
     table.incident = plan.incident;
     table.outgoing = plan.outgoing;
+    table.cells = plan.outgoing_cells;
     table.pairs = plan.pairs;
     table.channels = material.channels;
     table.orders = plan.separate_orders ? plan.max_order : 0;
@@ -107,32 +118,32 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
 
     const double scale = tracer.scale();
     RayCounts rays;
-    const std::vector<View> views = group_by_view(table);
-    auto write_view = [&](const View& view, const PathTally& total) {
+    const std::vector<Bundle> bundles = bundles_of(table);
+    auto write = [&](const Bundle& bundle, const PathTally& total) {
         rays += total.rays;
-        for (size_t l = 0; l < view.rows.size(); ++l)
+        for (size_t l = 0; l < bundle.rows.size(); ++l)
             for (size_t slice = 0; slice < n_slices; ++slice)
                 for (size_t c = 0; c < n_channels; ++c) {
                     const size_t from = (l * n_slices + slice) * n_channels + c;
-                    const size_t to = table.index(c, slice, view.rows[l]);
+                    const size_t to = table.index(c, slice, bundle.rows[l]);
                     table.f[to] = static_cast<float>(scale * total.sum[from]);
                     table.se[to] = static_cast<float>(scale * std::sqrt(total.squared_spread[from]));
                 }
     };
-    // A view is a shard.
+    // A bundle is a shard.
     Shards shards(options.checkpoints, options.shard_task);
     std::vector<std::string> keys;
-    for (size_t v = 0; v < views.size(); ++v) keys.push_back("view" + std::to_string(v));
+    for (size_t v = 0; v < bundles.size(); ++v) keys.push_back("view" + std::to_string(v));
     const Shards::Batch batch = shards.take(std::move(keys));
-    for (size_t v = 0; v < views.size(); ++v)
-        if (batch.saved[v]) write_view(views[v], path_tally_from(*batch.saved[v]));
+    for (size_t v = 0; v < bundles.size(); ++v)
+        if (batch.saved[v]) write(bundles[v], path_tally_from(*batch.saved[v]));
 
-    // Work in waves of (view, block) tasks, small enough for the memory and for frequent progress. The sums
+    // Work in waves of (bundle, block) tasks, small enough for the memory and for frequent progress. The sums
     // are added in the order of the tasks, so neither the size of a wave nor the number of threads shows in
     // the bits.
-    size_t most_lights = 1;
-    for (const View& view : views) most_lights = std::max(most_lights, view.lights.size());
-    const long long tally_bytes = static_cast<long long>(most_lights * n_values * 2 * sizeof(double));
+    size_t most_rows = 1;
+    for (const Bundle& bundle : bundles) most_rows = std::max(most_rows, bundle.rows.size());
+    const long long tally_bytes = static_cast<long long>(most_rows * n_values * 2 * sizeof(double));
     const long long by_memory = std::max(1LL, (options.max_bytes - scene_bytes) / 4 / tally_bytes);
     const long long blocks = tracer.blocks(),
                     n_tasks = blocks * static_cast<long long>(batch.to_compute.size());
@@ -143,9 +154,8 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
         monitor.report({static_cast<double>(first) / static_cast<double>(n_tasks), "path tracing", 0});
         const int n = static_cast<int>(std::min(wave, n_tasks - first));
         parallel_for(n, options.n_threads, [&](int k) {
-            const View& view = views[batch.to_compute[(first + k) / blocks]];
-            tallies[k] = tracer.trace(view.outgoing, to_vector(table.outgoing[view.outgoing]), view.lights,
-                                      static_cast<int>((first + k) % blocks), monitor);
+            tallies[k] = trace(tracer, table, bundles[batch.to_compute[(first + k) / blocks]],
+                               static_cast<int>((first + k) % blocks), monitor);
         });
         for (int k = 0; k < n; ++k) {
             if ((first + k) % blocks == 0) {
@@ -160,7 +170,7 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
             if ((first + k) % blocks != blocks - 1) continue;
             const int v = batch.to_compute[(first + k) / blocks];
             if (shards.are_kept()) shards.save(batch, v, to_bytes(total));
-            write_view(views[v], total);
+            write(bundles[v], total);
         }
     }
     shards.finish(batch);

@@ -22,6 +22,19 @@ Vec3 cosine_sample(const Vec3& n, double u1, double u2) {
     return {d.x / length, d.y / length, d.z / length};
 }
 
+// By its bounds, one after the other: the engine bins by tables.
+int cell_with(std::span<const ReceiverCell> cells, const Vec3& d) {
+    const double theta_deg = degrees(safe_acos(d.z)), phi_deg = degrees(std::atan2(d.y, d.x));
+    for (size_t k = 0; k < cells.size(); ++k) {
+        const ReceiverCell& cell = cells[k];
+        if (theta_deg < cell.theta_min_deg || theta_deg >= cell.theta_max_deg) continue;
+        const double past_deg = phi_deg - cell.phi_min_deg;
+        if (past_deg - 360 * std::floor(past_deg / 360) < cell.phi_max_deg - cell.phi_min_deg)
+            return static_cast<int>(k);
+    }
+    return -1;
+}
+
 double steepest_facet(const HeightField& s) {
     double squared = 0;
     for (int j = 0; j < s.ny; ++j)
@@ -297,6 +310,46 @@ PathTally PathTracer::trace(int view, const Vec3& wo, std::span<const Vec3> ligh
             }
         }
     }
+    return tally;
+}
+
+PathTally PathTracer::trace_into_cells(int light, const Vec3& wi, std::span<const ReceiverCell> cells,
+                                       int block, const Monitor& monitor) const {
+    monitor.check_cancelled();
+    PathTally tally;
+    tally.sum.resize(cells.size() * n_values());
+    tally.squared_spread.resize(cells.size() * n_values());
+    // One cell a path at most: -1 for those that are absorbed, lost or go elsewhere.
+    std::vector<int> cell_of(paths_of(block), -1);
+    std::vector<float> value(cell_of.size() * n_values());
+    const auto scatter = [&](const Vertex& vertex) { return sample(vertex, facet(vertex.hit)); };
+    const auto escape = [&](int path, int order, const Vec3& d, std::span<const float> throughput) {
+        cell_of[path] = cell_with(cells, d);
+        add_to_path(throughput, order, std::span(value).subspan(path * n_values(), n_values()));
+    };
+    walk(light, wi, block, tally.rays, scatter, escape);
+
+    const auto add = [&](int cell, size_t k, double sum, double difference) {
+        if (cell < 0) return;
+        tally.sum[cell * n_values() + k] += sum;
+        tally.squared_spread[cell * n_values() + k] += difference * difference;
+    };
+    for (size_t path = 0; path < cell_of.size(); path += 2)
+        for (size_t k = 0; k < n_values(); ++k) {
+            const double a = value[path * n_values() + k], b = value[(path + 1) * n_values() + k];
+            if (cell_of[path] == cell_of[path + 1]) {
+                add(cell_of[path], k, a + b, a - b);
+            } else {
+                add(cell_of[path], k, a, a);
+                add(cell_of[path + 1], k, b, b);
+            }
+        }
+    for (size_t cell = 0; cell < cells.size(); ++cell)
+        for (size_t k = 0; k < n_values(); ++k) {
+            const double to_f = 1 / projected_solid_angle(cells[cell]);
+            tally.sum[cell * n_values() + k] *= to_f;
+            tally.squared_spread[cell * n_values() + k] *= to_f * to_f;
+        }
     return tally;
 }
 

@@ -4,10 +4,13 @@
 // A path starts from a point of a horizontal plane above the relief, stratified over the period, and bounces
 // by sampling the facets' reflectance until it escapes.
 //
-// It starts along the viewing direction, and every vertex is connected to all lights (next-event estimation),
-// so each path serves all lights, orders and channels. With throughput_k, the product of f_micro cos / pdf over
-// the vertices before k, its estimate is
+// Point directions: it starts along the viewing direction, and every vertex is connected to all lights
+// (next-event estimation), so each path serves all lights, orders and channels. With throughput_k, the
+// product of f_micro cos / pdf over the vertices before k, its estimate is
 //     f(wi, wo) = 1 / cos_i sum_k throughput_k f_micro(wi, wo_k) <n_k, wi>+ V(p_k, wi).
+// Receiver cells: it starts along the light, and its throughput goes to the cell that it escapes into, over
+// the projected solid angle of that. So mirrors are seen, too.
+//
 // Exact for the facets but for rounding: Embree's floats place a ray to about 1e-5 cell, which shows (0.1 %)
 // where only slivers are lit or seen: slope * tan(theta) above about 2000.
 #pragma once
@@ -17,6 +20,7 @@
 #include <vector>
 
 #include "base/monitor.h"
+#include "directions/cells.h"
 #include "directions/direction.h"
 #include "material/facet_brdf.h"
 #include "scattering/embree_scene.h"
@@ -40,7 +44,7 @@ struct RayCounts {
     RayCounts& operator+=(const RayCounts& other);
 };
 
-// Sums over the paths of one view, in double, each [light][slice][channel].
+// Sums over the paths of one view (or light), in double, each [light (or cell)][slice][channel].
 struct PathTally {
     std::vector<double> sum;             // of f
     std::vector<double> squared_spread;  // over strata, of (difference of the stratum's two paths)^2
@@ -60,6 +64,11 @@ class PathTracer {
     // not met by lights of a single direction. Thread-safe. Throws Error(cancelled).
     PathTally trace(int view, const Vec3& wo, std::span<const Vec3> lights, int block,
                     const Monitor& monitor) const;
+
+    // The same from light number `light` into cells that do not overlap, [cell][slice][channel]; what escapes
+    // into none of them is left out.
+    PathTally trace_into_cells(int light, const Vec3& wi, std::span<const ReceiverCell> cells, int block,
+                               const Monitor& monitor) const;
 
     // f = scale() * sum, standard error = scale() * sqrt(squared_spread).
     double scale() const;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "directions/cells.h"
 #include "directions/gonio_grid.h"
 #include "material/facet_brdf.h"
 #include "measure/reference.h"
@@ -182,6 +183,120 @@ TEST(PathTracerMaterials, MirrorsNeedCells) {
         EXPECT_EQ(error.field(), "/measure/outgoing");
         EXPECT_NE(std::string(error.what()).find("cells"), std::string::npos);
     }
+}
+
+// ---- receiver cells
+
+BrdfPlan cell_plan(const std::vector<AnglesDeg>& incident, const std::vector<ReceiverCell>& cells) {
+    BrdfPlan plan;
+    plan.incident = incident;
+    plan.outgoing_cells = cells;
+    plan.outgoing = centres(cells);
+    return plan;
+}
+
+size_t cell_with(const std::vector<ReceiverCell>& cells, const AnglesDeg& d) {
+    for (size_t k = 0; k < cells.size(); ++k)
+        if (d.theta_deg >= cells[k].theta_min_deg && d.theta_deg < cells[k].theta_max_deg)
+            for (const double turn : {-360.0, 0.0, 360.0})
+                if (d.phi_deg + turn >= cells[k].phi_min_deg && d.phi_deg + turn < cells[k].phi_max_deg)
+                    return k;
+    ADD_FAILURE() << "no cell";
+    return 0;
+}
+
+TEST(PathTracerCells, MirrorOfAPlane) {
+    const Material gold({"r", "g", "b"}, Mirror{{{}, {0.2, 0.5, 1.4}, {3.4, 2.4, 1.9}}});
+    const std::vector<ReceiverCell> cells = klems_full_cells();
+    const Table table =
+        trace(generate_plane(4, 1), gold, cell_plan({{0, 0}, {40, 100}, {77, 3}}, cells), 512);
+    for (size_t i = 0; i < 3; ++i) {
+        const AnglesDeg& wi = table.incident[i];
+        const size_t lit = cell_with(cells, {wi.theta_deg, wi.phi_deg + 180});
+        std::vector<double> weight(3);
+        FacetBrdf(gold, generate_plane(4, 1), 0, 0, 0).sample(to_vector(wi), 0, 0, 0, weight);
+        for (size_t o = 0; o < cells.size(); ++o)
+            for (size_t c = 0; c < 3; ++c) {
+                const double f = o == lit ? weight[c] / projected_solid_angle(cells[o]) : 0.0;
+                EXPECT_NEAR(table.f[table.index(c, 0, i * cells.size() + o)], f, 1e-5 * f) << i << " " << o;
+            }
+    }
+}
+
+// Two walls at right angles send light back in the plane across them, after two bounces.
+TEST(PathTracerCells, MirrorGrooveReflectsBack) {
+    const Material mirror({"y"}, Mirror{{0.9, {}, {}}});
+    const std::vector<ReceiverCell> cells = klems_full_cells();
+    const Table table =
+        trace(generate_v_groove(8, 2, 45), mirror, in_orders(cell_plan({{0, 0}, {20, 90}}, cells), 3), 8192);
+    for (size_t i = 0; i < 2; ++i) {
+        const AnglesDeg& wi = table.incident[i];
+        const size_t lit = cell_with(cells, {wi.theta_deg, wi.phi_deg + 180});
+        for (size_t o = 0; o < cells.size(); ++o)
+            for (const size_t order : {1, 2, 3}) {
+                const double f = o == lit && order == 2 ? 0.81 / projected_solid_angle(cells[o]) : 0.0;
+                EXPECT_NEAR(table.f[table.index(0, order, i * cells.size() + o)], f, 1e-4 * f + 1e-9)
+                    << i << " " << o;
+            }
+    }
+}
+
+// Nothing is absorbed: what arrives leaves into the cells.
+TEST(PathTracerCells, WhiteMirrorsKeepAllLight) {
+    const HeightField field = generate_gaussian(32, 32, 1, 4, 0.8, 3);
+    const std::vector<ReceiverCell> cells = equal_cells(64);
+    const Table table =
+        trace(field, {{"y"}, Mirror{{1.0, {}, {}}}}, cell_plan({{10, 0}, {70, 40}}, cells), 20000);
+    for (size_t i = 0; i < 2; ++i) {
+        double sum = 0;
+        for (size_t o = 0; o < cells.size(); ++o)
+            sum += projected_solid_angle(cells[o]) * table.f[i * cells.size() + o];
+        EXPECT_NEAR(sum, 1, 1e-4);
+    }
+}
+
+TEST(PathTracerCells, HalfMirrorHalfPaint) {
+    Material material;
+    material.channels = {"y"};
+    material.lobes = {{0.5, Mirror{{0.8, {}, {}}}}, {0.5, Lambertian{0.6}}};
+    const std::vector<ReceiverCell> cells = equal_cells(32);
+    const Table table = trace(generate_plane(4, 1), material, cell_plan({{30, 10}}, cells), 40000);
+    const size_t lit = cell_with(cells, {30, 190});
+    std::vector<double> pulls;
+    for (size_t o = 0; o < cells.size(); ++o)
+        pulls.push_back(pull(table, o, 0.3 / pi + (o == lit ? 0.4 / projected_solid_angle(cells[o]) : 0.0)));
+    expect_within(pulls, "half mirror");
+}
+
+// Light into cells against views out of them: other paths, the same mean.
+TEST(PathTracerCells, AreMeansOverDirections) {
+    const HeightField field = generate_gaussian(32, 32, 1, 4, 0.8, 3);
+    const std::vector<ReceiverCell> cells = equal_cells(12);
+    const Table binned = trace(field, mixed(), in_orders(cell_plan({{40, 20}}, cells), 2), 300000);
+    BrdfPlan plan;
+    plan.incident = {{40, 20}};
+    constexpr int side = 6, n = side * side;
+    for (const ReceiverCell& cell : cells)
+        for (int k = 0; k < n; ++k) {
+            const Vec3 d = direction_in(cell, (k / side + 0.5) / side, (k % side + 0.5) / side);
+            plan.outgoing.push_back({degrees(std::acos(d.z)), degrees(std::atan2(d.y, d.x))});
+        }
+    const Table viewed = trace(field, mixed(), in_orders(plan, 2), 1000, 2);
+    std::vector<double> pulls;
+    for (size_t c = 0; c < 2; ++c)
+        for (size_t slice = 0; slice <= 2; ++slice)
+            for (size_t o = 0; o < cells.size(); ++o) {
+                double mean = 0, squares = 0;
+                for (int k = 0; k < n; ++k) {
+                    const double f = viewed.f[viewed.index(c, slice, o * n + k)];
+                    mean += f / n;
+                    squares += f * f / n;
+                }
+                // What a random sample of n directions would leave: more than these do.
+                pulls.push_back(pull(binned, binned.index(c, slice, o), mean,
+                                     std::sqrt(std::max(0.0, squares - mean * mean) / n)));
+            }
+    expect_within(pulls, "cells");
 }
 
 }  // namespace

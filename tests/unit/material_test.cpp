@@ -419,6 +419,28 @@ TEST(Coat, IsConservative) {
     EXPECT_NEAR(f_of(FacetBrdf(metal_like, flat, 0, 0, 0), metal_like, w, w)[0], 1 / (4 * pi * 0.09), 1e-5);
 }
 
+// Light between a gray base and the coat, bounce by bounce. Of a smooth interface of index 1.5, diffuse light
+// inside is reflected to 59.6 % (Walsh's formula and reciprocity).
+TEST(Coat, GrayBasesBounceToAllOrders) {
+    EXPECT_NEAR(1 - mean_coat_transmittance(1.5, 1e-6) / (1.5 * 1.5), 0.596, 2e-3);
+    for (const double eta : {1.3, 2.2})
+        for (const double albedo : {0.2, 0.7}) {
+            const Material gray({"y"}, CoatedDiffuse{eta, 0.3, albedo}),
+                black({"y"}, CoatedDiffuse{eta, 0.3, 0.0});
+            const Vec3 wi = direction(40, 10), wo = direction(60, 120);
+            const double inside = 1 - mean_coat_transmittance(eta, 0.3) / (eta * eta);
+            double f = f_of(FacetBrdf(black, flat, 0, 0, 0), black, wi, wo)[0];
+            double order =
+                coat_transmittance(eta, 0.3, wi.z) * coat_transmittance(eta, 0.3, wo.z) / (pi * eta * eta);
+            for (int k = 0; k < 200; ++k, order *= inside) {
+                order *= albedo;
+                f += order;
+            }
+            EXPECT_NEAR(f_of(FacetBrdf(gray, flat, 0, 0, 0), gray, wi, wo)[0], f, 1e-10 * f)
+                << eta << " " << albedo;
+        }
+}
+
 TEST(Coat, TableIsTheMeanOverVisibleNormals) {
     std::mt19937_64 random(2);
     std::uniform_real_distribution<double> uniform(0, 1);
