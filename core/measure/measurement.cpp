@@ -131,6 +131,7 @@ void Measurement::add_runs(const std::vector<RunValues>& runs, Stage& stage) {
         totals_.seconds_links += r.seconds_links;
         totals_.seconds_series += r.seconds_series;
         totals_.applications = std::max(totals_.applications, r.applications);
+        totals_.heaviest = std::max(totals_.heaviest, r.heaviest);
     }
 }
 

@@ -21,21 +21,21 @@ double rms_slope(const HeightField& s) {
     return std::sqrt(sum / static_cast<double>(n));
 }
 
-double cells(const RunContext& context) {
-    return static_cast<double>(context.surface->nx) * context.surface->ny;
+double cells(const MeasuredScene& scene) {
+    return static_cast<double>(scene.surface->nx) * scene.surface->ny;
 }
 double window_cells() {
     return std::pow(tile_core + 2.0 * tile_halo, 2);
 }
 
-double worked_cells(const RunContext& context, const RunSettings& s) {
-    return s.tiles_x == 0 ? cells(context) : s.tiles_x * s.tiles_y * window_cells();
-}
-
 }  // namespace
 
-std::pair<int, int> covering_windows(const RunContext& context) {
-    const HeightField& s = *context.surface;
+double worked_cells(const MeasuredScene& scene, const RunSettings& s) {
+    return s.tiles_x == 0 ? cells(scene) : s.tiles_x * s.tiles_y * window_cells();
+}
+
+std::pair<int, int> covering_windows(const MeasuredScene& scene) {
+    const HeightField& s = *scene.surface;
     auto count = [](int n) { return std::max(1, (n + tile_core - 1) / tile_core); };
     return {count(s.nx - 2 * s.border_x), count(s.ny - 2 * s.border_y)};
 }
@@ -76,6 +76,29 @@ RunSettings first_settings(const RunContext& context, double target) {
     return settings;
 }
 
+std::optional<NextStep> more_windows(const MeasuredScene& scene, const Stage& stage, double excess,
+                                     const std::function<bool(const RunSettings&)>& fits) {
+    if (stage.settings.tiles_x == 0) return std::nullopt;
+    NextStep step{true, 0, stage.settings};
+    RunSettings& next = step.settings;
+    const auto [full_x, full_y] = covering_windows(scene);
+    const double runs_needed = std::ceil(1.2 * stage.f.count() * excess * excess);
+    if (runs_needed <= most_window_runs) {
+        step.more_runs = std::max(1, static_cast<int>(runs_needed) - stage.f.count());
+        return step;
+    }
+    if (next.tiles_x >= full_x && next.tiles_y >= full_y) return std::nullopt;
+    const double windows = std::ceil(runs_needed * next.tiles_x * next.tiles_y / runs_at_first);
+    const double shape = static_cast<double>(full_x) / full_y;
+    next.tiles_x = std::clamp(static_cast<int>(std::ceil(std::sqrt(windows * shape))), 1, full_x);
+    next.tiles_y = std::clamp(static_cast<int>(std::ceil(windows / next.tiles_x)), 1, full_y);
+    RunSettings whole = next;
+    whole.tiles_x = whole.tiles_y = 0;
+    const bool open = scene.surface->border_x > 0 || scene.surface->border_y > 0;
+    if (!open && worked_cells(scene, next) > cells(scene) && fits(whole)) next = whole;
+    return step;
+}
+
 NextStep next_step(const RunContext& context, const Stage& stage, const Estimate& e, double target) {
     NextStep step{false, 0, stage.settings};
     RunSettings& next = step.settings;
@@ -96,26 +119,9 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
     const double left =
         std::sqrt(std::max(target * target - e.systematic * e.systematic, 0.04 * target * target));
     const double excess = e.random / left;
-    if (next.tiles_x > 0) {  // most of the error is which part of the surface was seen: more windows
-        const auto [full_x, full_y] = covering_windows(context);
-        const double runs_needed = std::ceil(1.2 * stage.f.count() * excess * excess);
-        if (runs_needed <= most_window_runs) {
-            step.more_runs = std::max(1, static_cast<int>(runs_needed) - stage.f.count());
-            return decided();
-        }
-        if (next.tiles_x < full_x || next.tiles_y < full_y) {
-            const double windows = std::ceil(runs_needed * next.tiles_x * next.tiles_y / runs_at_first);
-            const double shape = static_cast<double>(full_x) / full_y;
-            next.tiles_x = std::clamp(static_cast<int>(std::ceil(std::sqrt(windows * shape))), 1, full_x);
-            next.tiles_y = std::clamp(static_cast<int>(std::ceil(windows / next.tiles_x)), 1, full_y);
-            RunSettings whole = next;
-            whole.tiles_x = whole.tiles_y = 0;
-            const bool open = context.surface->border_x > 0 || context.surface->border_y > 0;
-            if (!open && worked_cells(context, next) > cells(context) && run_fits(context, whole))
-                next = whole;
-            return decided();
-        }
-    }
+    if (const auto windows =
+            more_windows(context, stage, excess, [&](const RunSettings& s) { return run_fits(context, s); }))
+        return *windows;
     if (excess < 1.6 && stage.f.count() < most_runs) {
         step.more_runs =
             std::clamp(static_cast<int>(std::ceil(stage.f.count() * (1.15 * excess * excess - 1))), 2,

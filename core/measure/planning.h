@@ -1,6 +1,9 @@
 // How many sub-samples, directions, windows and runs: a first guess from the relief, then whatever dominates
 // the error.
 #pragma once
+#include <functional>
+#include <optional>
+
 #include "measure/estimate.h"
 
 namespace gonio {
@@ -9,8 +12,10 @@ inline constexpr int runs_at_first = 6, most_runs = 16, most_window_runs = 32;
 
 RunSettings first_settings(const RunContext& context, double target);
 
+// Cells that one run works on.
+double worked_cells(const MeasuredScene& scene, const RunSettings& settings);
 // Windows that cover the surface once, along x and y.
-std::pair<int, int> covering_windows(const RunContext& context);
+std::pair<int, int> covering_windows(const MeasuredScene& scene);
 // Whether one run at these settings fits context.max_bytes.
 bool run_fits(const RunContext& context, const RunSettings& settings);
 // Work of a run relative to another's.
@@ -21,6 +26,10 @@ struct NextStep {
     int more_runs = 0;      // > 0: at the same settings; 0: a new stage at `settings`
     RunSettings settings;
 };
+// Of a stage that sees the surface in windows, most of the error is which part of it was seen: more runs,
+// more windows, or the whole period where that is less work and fits. Nothing if that would not help.
+std::optional<NextStep> more_windows(const MeasuredScene& scene, const Stage& stage, double excess,
+                                     const std::function<bool(const RunSettings&)>& fits);
 NextStep next_step(const RunContext& context, const Stage& stage, const Estimate& estimate, double target);
 
 }  // namespace gonio

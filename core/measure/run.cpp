@@ -8,102 +8,26 @@
 
 #include "base/random.h"
 #include "base/sha256.h"
+#include "measure/blocks.h"
 #include "measure/windows.h"
 
 namespace gonio {
 namespace {
 
-double cpu_seconds() {
-    timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-// The random shifts of one run: streams 0..: window position, sub-sample, direction lattice, jitter.
-struct Shifts {
-    uint64_t seed, stream;
-    double operator()(int which) const { return uniform_double(random_words(seed, stream, which)[0]); }
-};
-
 // Turned lights are evaluated this many times the rms turn along links away: most turns lie within.
 constexpr double turn_step = 1.5;
 
-// Lights and views that are worked on together, and the table rows they answer.
-struct Block {
-    std::vector<int> lights, views;
-    bool same = false;
-    struct Row {
-        size_t row;
-        int light, view;  // inside the block
-    };
-    std::vector<Row> rows;
-};
-
-std::vector<Block> make_blocks(const RunContext& context, const RunSettings& settings) {
+std::vector<Block> run_blocks(const RunContext& context, const RunSettings& settings) {
     const int n_lights = static_cast<int>(context.lights.size()),
               n_views = static_cast<int>(context.views.size());
-    std::vector<Block> blocks;
-    if (!context.view_to_light.empty() &&
-        run_bytes(context, settings, n_lights, 0) <= static_cast<double>(context.max_bytes)) {
-        Block block;
-        block.same = true;
-        for (int l = 0; l < n_lights; ++l) block.lights.push_back(l);
-        for (size_t r = 0; r < context.rows(); ++r) {
-            const auto [i, o] = context.plan->pairs.empty()
-                                    ? std::pair{static_cast<int>(r / n_views), static_cast<int>(r % n_views)}
-                                    : context.plan->pairs[r];
-            block.rows.push_back({r, i, context.view_to_light[o]});
-        }
-        blocks.push_back(std::move(block));
-        return blocks;
-    }
+    const auto most_bytes = static_cast<double>(context.max_bytes);
+    const bool same =
+        !context.view_to_light.empty() && run_bytes(context, settings, n_lights, 0) <= most_bytes;
     int most = 1 << 14;
-    while (most > column_block && run_bytes(context, settings, std::min(most, n_lights),
-                                            std::min(most, n_views)) > static_cast<double>(context.max_bytes))
+    while (most > column_block &&
+           run_bytes(context, settings, std::min(most, n_lights), std::min(most, n_views)) > most_bytes)
         most /= 2;
-    if (context.plan->pairs.empty()) {
-        for (int l = 0; l < n_lights; l += most)
-            for (int v = 0; v < n_views; v += most) {
-                Block block;
-                for (int i = l; i < std::min(n_lights, l + most); ++i) block.lights.push_back(i);
-                for (int o = v; o < std::min(n_views, v + most); ++o) block.views.push_back(o);
-                for (size_t i = 0; i < block.lights.size(); ++i)
-                    for (size_t o = 0; o < block.views.size(); ++o)
-                        block.rows.push_back({static_cast<size_t>(block.lights[i]) * n_views + block.views[o],
-                                              static_cast<int>(i), static_cast<int>(o)});
-                blocks.push_back(std::move(block));
-            }
-        return blocks;
-    }
-    // A list of pairs is answered from products of few directions each: sparse lists would waste larger ones.
-    const double density = static_cast<double>(context.rows()) / (static_cast<double>(n_lights) * n_views);
-    if (density < 0.1) most = std::min(most, 256);
-    std::vector<int> light_at(n_lights, -1), view_at(n_views, -1);
-    Block block;
-    auto flush = [&] {
-        for (const int l : block.lights) light_at[l] = -1;
-        for (const int v : block.views) view_at[v] = -1;
-        blocks.push_back(std::move(block));
-        block = {};
-    };
-    for (size_t r = 0; r < context.rows(); ++r) {
-        const auto [i, o] = context.plan->pairs[r];
-        const bool new_light = light_at[i] < 0, new_view = view_at[o] < 0;
-        if ((new_light && static_cast<int>(block.lights.size()) == most) ||
-            (new_view && static_cast<int>(block.views.size()) == most))
-            flush();
-        if (light_at[i] < 0) {
-            light_at[i] = static_cast<int>(block.lights.size());
-            block.lights.push_back(i);
-        }
-        if (view_at[o] < 0) {
-            view_at[o] = static_cast<int>(block.views.size());
-            block.views.push_back(o);
-        }
-        block.rows.push_back({r, light_at[i], view_at[o]});
-    }
-    flush();
-    return blocks;
+    return make_blocks(context, same, most, 256);
 }
 
 std::vector<ChannelFactors> map_factors(const RunContext& context, const Tile& tile) {
@@ -200,6 +124,19 @@ void write_rows(const RunContext& context, const Block& block, const Sums& sums,
 
 }  // namespace
 
+RunShifts::RunShifts(uint64_t seed, int stage, int run)
+    : seed_(seed), stream_(static_cast<uint64_t>(stage) << 32 | static_cast<uint32_t>(run)) {}
+
+double RunShifts::operator()(int which) const {
+    return uniform_double(random_words(seed_, stream_, which)[0]);
+}
+
+double thread_seconds() {
+    timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
 std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b) {
     std::vector<SubSample> samples;
     for (int k = 0; k < n; ++k)
@@ -248,8 +185,7 @@ std::string settings_key(const RunContext& context, const RunSettings& settings)
 
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
                    const Monitor& monitor) {
-    const Shifts shifts{context.plan->accuracy.seed,
-                        static_cast<uint64_t>(stage) << 32 | static_cast<uint32_t>(run)};
+    const RunShifts shifts(context.plan->accuracy.seed, stage, run);
     const size_t n_rows = context.rows(), n_channels = context.n_channels();
     RunValues values;
     const std::vector<Tile> tiles = run_tiles(context, settings, shifts(0), shifts(1));
@@ -261,7 +197,7 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
     const std::vector<SubSample> jitter = shifted_sub_samples(settings.directions, shifts(6), shifts(7));
 
     size_t slices = 0;
-    for (const Block& block : make_blocks(context, settings)) {
+    for (const Block& block : run_blocks(context, settings)) {
         std::vector<Vec3> lights, views;
         for (const int l : block.lights) lights.push_back(context.lights[l]);
         if (block.same)
@@ -272,25 +208,25 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
         for (const Tile& tile : tiles) {
             monitor.check_cancelled();
             const std::vector<ChannelFactors> factors = map_factors(context, tile);
-            double clock = cpu_seconds();
+            double clock = thread_seconds();
             Irradiance irradiance =
                 compute_irradiance(*context.grid, tile, lights, views, block.same, sub_samples, factors,
                                    context.allow_skips, n_threads, monitor);
             values.rays += irradiance.rays;
             values.rays_skipped += irradiance.rays_skipped;
             values.truncated_bundles += irradiance.truncated_bundles;
-            values.seconds_direct += cpu_seconds() - clock;
+            values.seconds_direct += thread_seconds() - clock;
             std::vector<OrderSeries> series;
             if (context.transports()) {
-                clock = cpu_seconds();
+                clock = thread_seconds();
                 const LinkOperator op =
                     build_link_operator(*context.grid, tile, set, jitter, n_threads, monitor);
                 values.rays += op.rays;
                 values.links += op.links;
                 values.substituted += op.substituted;
                 values.dropped += op.dropped;
-                values.seconds_links += cpu_seconds() - clock;
-                clock = cpu_seconds();
+                values.seconds_links += thread_seconds() - clock;
+                clock = thread_seconds();
                 SeriesOptions options;
                 options.max_order = context.max_order;
                 options.tolerance = context.series_tolerance;
@@ -300,7 +236,8 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     options.fixed_applications = values.applications;
                 options.keep_first = context.keep_first && slices == 0 && settings.tiles_x == 0;
                 options.keep_orders = context.keep_orders;
-                if (!context.lambertian->albedo.is_map()) options.albedos = context.lambertian->albedo.constant;
+                if (!context.lambertian->albedo.is_map())
+                    options.albedos = context.lambertian->albedo.constant;
                 const bool curved = context.surface->base.is_curved();
                 TurnedLight turned;
                 if (curved) {
@@ -345,7 +282,7 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                     values.higher_orders =
                         std::max(values.higher_orders, static_cast<int>(series.back().orders.size()));
                 }
-                values.seconds_series += cpu_seconds() - clock;
+                values.seconds_series += thread_seconds() - clock;
             }
             sums.add(irradiance, series, tile.core_area());
         }

@@ -26,11 +26,6 @@ struct RunContext : MeasuredScene {
     bool keep_first = false;  // RunValues::first, for the noise bias
 
     bool transports() const { return indirect && max_order != 1; }
-    // The projected area of one period is A cos theta in truth. Not so of a part of a surface, or on a curved
-    // base: there values are divided by the plain area.
-    bool projected_area_is_known() const {
-        return surface->border_x == 0 && surface->border_y == 0 && !surface->base.is_curved();
-    }
 };
 
 struct RunSettings {
@@ -47,6 +42,7 @@ struct RunValues {
     int applications = 0;
     double ratio = 0, remainder = 0;  // largest, see OrderSeries
     double turn = 0;                  // on a curved base: rms turn of the frame along links, radians
+    double heaviest = 0;              // largest, see GraphOrders
     // f in 1/sr, [channel][slice][row]; slices as in Table: 0 the sum, then single orders if they are kept
     // apart for the table.
     std::vector<float> f;
@@ -71,6 +67,20 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
 // What decides the bits of a run beside the job, the stage and the number of the run, and of that what a job
 // with another target may have in common with this one; 16 hex digits.
 std::string settings_key(const RunContext& context, const RunSettings& settings);
+
+// The random shifts of one run, in [0, 1): 0, 1 window position; 2, 3 sub-samples; 4, 5 direction lattice; 6,
+// 7 jitter; then what a transport needs beside.
+class RunShifts {
+  public:
+    RunShifts(uint64_t seed, int stage, int run);
+    double operator()(int which) const;
+
+  private:
+    uint64_t seed_, stream_;
+};
+
+// CPU time of the calling thread.
+double thread_seconds();
 
 // n places inside the facets: the R2 sequence (Roberts 2018) from a random start.
 std::vector<SubSample> shifted_sub_samples(int n, double shift_a, double shift_b);

@@ -27,6 +27,11 @@ struct MeasuredScene {
 
     size_t rows() const { return groups.light.size(); }
     size_t n_channels() const { return material->channels.size(); }
+    // The projected area of one period is A cos theta in truth. Not so of a part of a surface, or on a curved
+    // base: there values are divided by the plain area.
+    bool projected_area_is_known() const {
+        return surface->border_x == 0 && surface->border_y == 0 && !surface->base.is_curved();
+    }
 };
 
 }  // namespace gonio

@@ -93,6 +93,7 @@ void visit(Archive& archive, Run& run) {
     archive(run.ratio);
     archive(run.remainder);
     archive(run.turn);
+    archive(run.heaviest);
     archive(run.f);
     archive(run.direct);
     archive(run.projected_lights);
@@ -148,6 +149,11 @@ void visit(Archive& archive, Tally& tally) {
     archive(tally.rays.lost);
 }
 
+template <class Archive, Either<double> Number>
+void visit(Archive& archive, Number& number) {
+    archive(number);
+}
+
 template <class T>
 std::string encoded(const T& value) {
     Writer writer;
@@ -178,6 +184,9 @@ std::string to_bytes(const MeshBias& bias) {
 std::string to_bytes(const PathTally& tally) {
     return encoded(tally);
 }
+std::string to_bytes(double number) {
+    return encoded(number);
+}
 
 RunValues run_values_from(const std::string& bytes) {
     return decoded<RunValues>(bytes);
@@ -190,6 +199,10 @@ MeshBias mesh_bias_from(const std::string& bytes) {
 }
 PathTally path_tally_from(const std::string& bytes) {
     return decoded<PathTally>(bytes);
+}
+
+double number_from(const std::string& bytes) {
+    return decoded<double>(bytes);
 }
 
 }  // namespace gonio

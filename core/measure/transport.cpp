@@ -4,6 +4,7 @@
 
 #include "measure/diffuse_transport.h"
 #include "measure/forward_transport.h"
+#include "measure/graph_transport.h"
 
 namespace gonio {
 namespace {
@@ -48,9 +49,10 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
         throw Error(ErrorCode::invalid_input, "/measure/transport", "diffuse",
                     "carries the light of Lambertian facets alone; leave it to \"auto\"");
     if (scene.surface->base.is_curved() && kind != TransportKind::diffuse)
-        throw Error(ErrorCode::invalid_input, "/base", "",
-                    std::string("only the light of Lambertian facets is carried over a curved base, not by ") +
-                        name_of(kind));
+        throw Error(
+            ErrorCode::invalid_input, "/base", "",
+            std::string("only the light of Lambertian facets is carried over a curved base, not by ") +
+                name_of(kind));
     const std::string cells = R"({"cells": "klems_full"} or {"cells": {"equal": N}})";
     if (scene.plan->outgoing_cells.empty() && has_mirror(*scene.material))
         throw Error(ErrorCode::invalid_input, "/measure/outgoing", "directions",
@@ -68,9 +70,12 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
             return std::make_unique<DiffuseTransport>(scene, *lambertian, report);
         case TransportKind::forward:
             return std::make_unique<ForwardTransport>(scene);
-        default:
-            throw Error(ErrorCode::invalid_input, "/measure/transport", name_of(kind), "is not there yet");
+        case TransportKind::pair_graph:
+            return std::make_unique<GraphTransport>(scene, report);
+        case TransportKind::automatic:
+            break;
     }
+    throw Error(ErrorCode::internal, "/measure/transport", name_of(kind), "was not chosen");
 }
 
 }  // namespace gonio

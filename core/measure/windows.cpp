@@ -5,19 +5,19 @@
 
 namespace gonio {
 
-Tile whole_tile(const RunContext& context, const RunSettings& settings) {
-    const HeightField& s = *context.surface;
+Tile whole_tile(const MeasuredScene& scene, const RunSettings& settings) {
+    const HeightField& s = *scene.surface;
     return make_tile(s, {0, 0, s.nx, s.ny},
                      {s.border_x, s.border_y, s.nx - 2 * s.border_x, s.ny - 2 * s.border_y},
                      settings.refinement);
 }
 
-std::vector<Tile> run_tiles(const RunContext& context, const RunSettings& settings, double shift_x,
+std::vector<Tile> run_tiles(const MeasuredScene& scene, const RunSettings& settings, double shift_x,
                             double shift_y) {
-    const HeightField& s = *context.surface;
+    const HeightField& s = *scene.surface;
     if (settings.tiles_x == 0) {
         std::vector<Tile> tiles;
-        tiles.push_back(whole_tile(context, settings));
+        tiles.push_back(whole_tile(scene, settings));
         return tiles;
     }
     // A randomly shifted lattice of windows: with as many as fit it covers the surface once. The inner
@@ -49,17 +49,17 @@ std::vector<Tile> run_tiles(const RunContext& context, const RunSettings& settin
     return tiles;
 }
 
-std::vector<Vec3> probe_directions(const RunContext& context) {
+std::vector<Vec3> probe_directions(const MeasuredScene& scene) {
     constexpr size_t most = 16;
-    std::vector<Vec3> chosen, all = context.lights;
-    if (context.view_to_light.empty()) all.insert(all.end(), context.views.begin(), context.views.end());
+    std::vector<Vec3> chosen, all = scene.lights;
+    if (scene.view_to_light.empty()) all.insert(all.end(), scene.views.begin(), scene.views.end());
     const size_t n = std::min(most, all.size());
     for (size_t k = 0; k < n; ++k) chosen.push_back(all[(2 * k + 1) * all.size() / (2 * n)]);
     return chosen;
 }
 
-Tile probe_tile(const RunContext& context, const RunSettings& settings, int refinement) {
-    const HeightField& s = *context.surface;
+Tile probe_tile(const MeasuredScene& scene, const RunSettings& settings, int refinement) {
+    const HeightField& s = *scene.surface;
     // A long and narrow surface is small, too, and a part of it may miss what matters (one wall of a groove).
     const bool whole =
         settings.tiles_x == 0 && static_cast<double>(s.nx) * s.ny <= std::pow(tile_core + 2.0 * tile_halo, 2);

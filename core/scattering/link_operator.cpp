@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "scattering/ray_hits.h"
 #include "visibility/curvature.h"
 #include "visibility/march.h"
 
@@ -60,47 +61,6 @@ struct PendingLink {
     LinkTurn turn;
 };
 
-int into_period(int i, int n) {
-    return i >= 0 && i < n ? i : wrap_index(i, n);
-}
-
-// Column and row of the hit cell inside the tile, or nothing if the ray has left the tile.
-bool hit_cell(const Tile& tile, int column, int row, int& hit_column, int& hit_row) {
-    hit_column = into_period(column, tile.nx);
-    hit_row = into_period(row, tile.ny);
-    return hit_column < tile.area.width && hit_row < tile.area.height;
-}
-
-// Where inside its cell the ray hits, from the two crossings that bracket the hit.
-int hit_part(const MarchGrid& grid, const OperatorBundle& bundle, int cell_x, int cell_y, int k,
-             int refinement, int kind) {
-    const RayBundle& rays = bundle.rays;
-    const MarchPlane& plane = rays.transposed ? grid.transposed : grid.rows;
-    const int own_column = rays.transposed ? cell_y : cell_x,
-              own_row = rays.transposed ? cell_x : cell_y;  // of the surface
-    const float* own = &plane.heights[static_cast<size_t>(own_row) * plane.stride + own_column];
-    const float height = own[0] * rays.start_weight[0] +
-                         own[rays.start.kind == 0 ? 1 : plane.stride] * rays.start_weight[1] +
-                         own[plane.stride + 1] * rays.start_weight[2];
-    auto above = [&](int crossing) {
-        const Crossing& c = rays.crossings[crossing];
-        int column = own_column + c.column, row = own_row + c.row;
-        if (column >= plane.nx) column -= plane.nx;
-        if (row >= plane.ny) row -= plane.ny;
-        const float* p = &plane.heights[static_cast<size_t>(row) * plane.stride + column];
-        return static_cast<double>(p[0]) * c.weight0 + static_cast<double>(p[c.second_node]) * c.weight1 -
-               c.rise - height;
-    };
-    const double before = above(k - 1), after = above(k);  // < 0, > 0
-    const double share = std::clamp(before / (before - after), 0.0, 1.0);
-    const double travel = rays.facets[k - 1].travel +
-                          share * (static_cast<double>(rays.facets[k].travel) - rays.facets[k - 1].travel);
-    double u = rays.start.u + rays.direction.step_x * travel - rays.facets[k].column;
-    double v = rays.start.v + rays.direction.step_y * travel - rays.facets[k].row;
-    if (rays.transposed) std::swap(u, v);
-    return facet_part(kind, u, v, refinement);
-}
-
 void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<OperatorBundle>& bundles,
                  const LineGroup& group, HitLines& lines, std::vector<PendingLink>& pending,
                  LinkOperator& counts) {
@@ -149,7 +109,7 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
                         if (tile.refinement > 1)
                             seen += n_slots *
                                     static_cast<uint32_t>(hit_part(
-                                        grid, bundle, into_period(tile.area.x0 + column, tile.nx),
+                                        grid, bundle.rays, into_period(tile.area.x0 + column, tile.nx),
                                         into_period(tile.area.y0 + row, tile.ny), k, tile.refinement, kind));
                     } else if (seen == nothing) {
                         counts.dropped += 1;

@@ -1,0 +1,30 @@
+// One randomised run of the glossy engine: exact direct term, pair graph for the orders beyond.
+#pragma once
+#include "measure/run.h"
+#include "scattering/pair_graph.h"
+
+namespace gonio {
+
+// What the runs of a job by the pair graph share.
+struct GraphContext : MeasuredScene {
+    std::vector<ChannelGroup> channel_groups;
+    bool indirect = true;  // false: the relief is too gentle for light to be scattered twice
+    double series_tolerance = 1e-4;
+    int single_orders = 0;  // slices of single orders to keep; 0: as many as the first run gives
+
+    bool transports() const { return indirect && plan->max_order != 1; }
+    // Orders are needed one by one.
+    bool keep_orders() const;
+};
+
+RunValues graph_run(const GraphContext& context, const RunSettings& settings, int stage, int run,
+                    int n_threads, const Monitor& monitor);
+
+// Working memory of one run, bytes, for so many lights and views at a time.
+double graph_run_bytes(const GraphContext& context, const RunSettings& settings, int n_lights, int n_views);
+
+// Shared directions of a run on a tile, and the pairs they give.
+PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,
+                    const RunShifts& shifts, int n_threads, const Monitor& monitor);
+
+}  // namespace gonio

@@ -1,0 +1,230 @@
+#include "measure/graph_transport.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <tuple>
+
+#include "base/sha256.h"
+#include "measure/describe.h"
+#include "measure/graph_mesh.h"
+#include "measure/shard_bytes.h"
+#include "measure/stage_average.h"
+#include "measure/windows.h"
+#include "visibility/march.h"
+
+namespace gonio {
+namespace {
+
+constexpr int least_directions = 16;
+
+}  // namespace
+
+GraphTransport::GraphTransport(const MeasuredScene& scene, Report& report) {
+    static_cast<MeasuredScene&>(context_) = scene;
+    context_.channel_groups = channel_groups(*scene.material);
+    const BrdfPlan& plan = *scene.plan;
+    const double target = plan.accuracy.target();
+    if (context_.channel_groups.size() < scene.n_channels())
+        report.skipped.push_back({"all channels but " + std::to_string(context_.channel_groups.size()),
+                                  "the others reflect in proportion: their orders are multiples"});
+    // Of the light of a facet, at most this share comes from other facets if it is diffuse: they stand within
+    // the slab |z| <= L / sqrt(1 + L^2). A lobe can send all of it that way, so here it is skipped only where
+    // no ray can hit anything.
+    const double slope = scene.grid->max_slope;
+    if (scene.allow_skips && slope < 1e-9) {
+        context_.indirect = false;
+        report.skipped.push_back({"indirect light", "the surface is a plane"});
+    }
+    context_.series_tolerance = std::clamp(0.02 * target, 1e-6, 1e-4);
+    if (plan.max_order == 1) report.skipped.push_back({"indirect light", "max_order is 1"});
+    context_.single_orders = plan.separate_orders ? plan.max_order : 0;
+}
+
+RunSettings GraphTransport::first_settings(double target) const {
+    RunSettings settings{1, 64, 1, 0, 0};
+    if (target < 0.003) settings.directions = 128;
+    if (static_cast<double>(context_.surface->nx) * context_.surface->ny >
+        1.5 * std::pow(tile_core + 2.0 * tile_halo, 2))
+        settings.tiles_x = settings.tiles_y = 1;
+    return settings;
+}
+
+RunSettings GraphTransport::settings_of(const Accuracy::Samples& samples) const {
+    RunSettings settings{samples.sub_samples, samples.directions, samples.refinement, 0, 0};
+    if (!fits(settings)) std::tie(settings.tiles_x, settings.tiles_y) = covering_windows(context_);
+    const int least = least_directions * samples.refinement * samples.refinement;
+    if (samples.directions < least && context_.indirect)
+        throw Error(ErrorCode::invalid_input, "/accuracy/samples/directions",
+                    std::to_string(samples.directions),
+                    "needs at least 16 refinement^2 = " + std::to_string(least));
+    return settings;
+}
+
+double GraphTransport::least_bytes(const RunSettings& settings) const {
+    return graph_run_bytes(context_, settings, std::min<int>(64, static_cast<int>(context_.lights.size())),
+                           std::min<int>(64, static_cast<int>(context_.views.size())));
+}
+
+double GraphTransport::wanted_bytes(const RunSettings& settings) const {
+    const int n_views = context_.view_to_light.empty() ? static_cast<int>(context_.views.size()) : 0;
+    return graph_run_bytes(context_, settings, static_cast<int>(context_.lights.size()), n_views);
+}
+
+bool GraphTransport::fits(const RunSettings& settings) const {
+    return least_bytes(settings) < static_cast<double>(context_.max_bytes);
+}
+
+RunValues GraphTransport::run(const RunSettings& settings, int stage, int run, int n_threads,
+                              const Monitor& monitor) const {
+    return graph_run(context_, settings, stage, run, n_threads, monitor);
+}
+
+std::string GraphTransport::settings_key(const RunSettings& settings) const {
+    const double numbers[] = {2,  // the pair graph's, and no other transport's
+                              static_cast<double>(settings.sub_samples),
+                              static_cast<double>(settings.directions),
+                              static_cast<double>(settings.refinement),
+                              static_cast<double>(settings.tiles_x),
+                              static_cast<double>(settings.tiles_y),
+                              static_cast<double>(context_.indirect),
+                              static_cast<double>(context_.allow_skips),
+                              static_cast<double>(!context_.view_to_light.empty()),
+                              static_cast<double>(context_.single_orders),
+                              static_cast<double>(context_.max_bytes),
+                              context_.series_tolerance};
+    return sha256_hex(bytes_of(numbers, std::size(numbers))).substr(0, 16);
+}
+
+void GraphTransport::fix_orders(const RunValues& first) {
+    if (context_.single_orders == 0) context_.single_orders = first.higher_orders + 1;
+}
+
+// The two-grid runs are skipped where a guess from the relief is far below what was asked for.
+void GraphTransport::find_bias(const std::vector<Stage>& stages, const SideWork& side, Report& report) {
+    if (!context_.transports()) return;
+    mesh_doubt_ = predict_mesh_bias(*context_.surface).guess;
+    const Estimate guessed = estimate(stages);
+    const Accuracy& accuracy = context_.plan->accuracy;
+    if (context_.allow_skips &&
+        2 * guessed.systematic < std::max(accuracy.target(), accuracy.samples ? guessed.random : 0.0)) {
+        if (stages.size() == 1)
+            report.skipped.push_back({"two-grid run", "facets resolve the relief: mesh bias guessed at " +
+                                                          number(guessed.systematic)});
+        return;
+    }
+    const std::string bytes = side.kept(stages.back(), "mesh", [&] {
+        return to_bytes(measure_graph_mesh(context_, stages.back().settings, side.n_threads, side.monitor));
+    });
+    mesh_doubt_ = number_from(bytes);
+    mesh_measured_ = true;
+}
+
+Estimate GraphTransport::estimate(const std::vector<Stage>& stages) const {
+    Estimate e = average_stages(context_, stages);
+    const Stage& last = stages.back();
+    const size_t rows = context_.rows(), n_channels = context_.n_channels(),
+                 slices = e.f.size() / (rows * n_channels);
+    const std::vector<double> unresolved = unresolved_rows(context_, last);
+    for (size_t c = 0; c < n_channels; ++c)
+        for (size_t slice = 0; slice < slices; ++slice)
+            for (size_t r = 0; r < rows; ++r) {
+                const size_t i = (c * slices + slice) * rows + r, sum = c * slices * rows + r;
+                const double f = e.f[i], total = e.f[sum];
+                // Of channel 0, and in proportion of the others.
+                const double direct_0 = last.direct.mean()[r], total_0 = e.f[r],
+                             direct = slices > 1    ? e.f[sum + rows]
+                                      : total_0 > 0 ? direct_0 / total_0 * total
+                                                    : 0.0;
+                const double indirect = slice == 1 ? 0.0 : slice == 0 ? std::max(0.0, f - direct) : f;
+                const double left_out = slice == 0 ? last.remainder * (direct + 2 * indirect) : 0.0;
+                // What could not be sampled: no facet gets more light than the beam carries.
+                const double lost = unresolved[r],
+                             cosine = std::max(context_.lights[context_.groups.light[r]].z,
+                                               context_.views[context_.groups.view[r]].z),
+                             ceiling = lost < 1 ? f : 1 / (pi * cosine);
+                e.bias[i] = std::hypot(mesh_doubt_ * indirect, left_out) + lost * ceiling;
+            }
+    summarise(context_, last, e);
+    return e;
+}
+
+NextStep GraphTransport::next_step(const Stage& stage, const Estimate& e, double target) const {
+    NextStep step{true, 0, stage.settings};
+    RunSettings& next = step.settings;
+    if (e.systematic > 0.8 * target) {
+        RunSettings finer = next;
+        finer.refinement *= 2;
+        finer.directions *= 4;
+        if (context_.transports() && mesh_measured_ && finer.refinement <= 8 && fits(finer)) {
+            next = finer;
+            return step;
+        }
+        if (e.random < 0.5 * target) return {false, 0, stage.settings};  // it cannot be refined away
+    }
+    const double left =
+        std::sqrt(std::max(target * target - e.systematic * e.systematic, 0.04 * target * target));
+    const double excess = e.random / left;
+    if (const auto windows =
+            more_windows(context_, stage, excess, [&](const RunSettings& s) { return fits(s); }))
+        return *windows;
+    if (excess < 1.6 && stage.f.count() < most_runs) {
+        step.more_runs =
+            std::clamp(static_cast<int>(std::ceil(stage.f.count() * (1.15 * excess * excess - 1))), 2,
+                       most_runs - stage.f.count());
+        return step;
+    }
+    // Measured (shared/performance_glossy A1, A2): the direct error falls as n^-0.6, that of the orders
+    // beyond as n^-1.2.
+    auto grown = [](int n, double excess_of_part, double order, int most) {
+        return std::min(
+            most, static_cast<int>(std::ceil(n * std::clamp(std::pow(excess_of_part, 1 / order), 1.5, 8.0))));
+    };
+    const double indirect = std::sqrt(std::max(0.0, e.random * e.random - e.direct * e.direct)),
+                 share = 0.65 * left;
+    if (e.direct > share) next.sub_samples = grown(next.sub_samples, e.direct / share, 0.6, 4096);
+    if (indirect > share && context_.transports()) {
+        RunSettings more = next;
+        more.directions = grown(next.directions, indirect / share, 1.1, 1 << 14);
+        if (fits(more)) next = more;
+    }
+    if (next == stage.settings && stage.f.count() < most_window_runs) step.more_runs = runs_at_first;
+    step.possible = step.more_runs > 0 || !(next == stage.settings);
+    return step;
+}
+
+double GraphTransport::relative_cost(const RunSettings& settings, const RunSettings& reference) const {
+    const double samples = std::max(static_cast<double>(settings.directions) / reference.directions,
+                                    static_cast<double>(settings.sub_samples) / reference.sub_samples);
+    return samples * worked_cells(context_, settings) / worked_cells(context_, reference) *
+           std::pow(static_cast<double>(settings.refinement) / reference.refinement, 2);
+}
+
+void GraphTransport::describe(const std::vector<Stage>& stages, const RunValues& totals,
+                              Report& report) const {
+    const Stage& last = stages.back();
+    describe_settings(stages, report);
+    report.settings.push_back({"orders", std::to_string(totals.applications + 1)});
+    report.settings.push_back({"mesh_bias", (mesh_measured_ ? "two grids: " : "guessed from the relief: ") +
+                                                number(100 * mesh_doubt_) + " % of the orders beyond 1"});
+    report.settings.push_back({"relative_error", number(report.relative_error)});
+    report.counters = {{"rays", totals.rays},
+                       {"rays skipped (steeper than the relief)", totals.rays_skipped},
+                       {"pairs", totals.links},
+                       {"pairs substituted at window borders", totals.substituted},
+                       {"pairs dropped at window borders", totals.dropped},
+                       {"nearly horizontal bundles given up", static_cast<double>(totals.truncated_bundles)},
+                       {"largest share that one pair passes on", totals.heaviest}};
+    report.seconds = {{"visibility and direct light", totals.seconds_direct},
+                      {"pairs", totals.seconds_links},
+                      {"orders of scattering", totals.seconds_series}};
+    describe_skips(context_, last, totals, report);
+    if (totals.heaviest > 1)
+        report.warnings.push_back(
+            "the lobes are narrower than the shared directions are dense (a pair passes on " +
+            number(totals.heaviest) +
+            " times what it got): orders 3 and up have heavy tails; receiver cells and \"forward\" do "
+            "better");
+}
+
+}  // namespace gonio

@@ -1,0 +1,248 @@
+// Light swept through the pair graph, order by order.
+#include "scattering/pair_graph.h"
+
+#include <cblas.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+
+namespace gonio {
+namespace {
+
+constexpr size_t chunk_pairs = 256;
+constexpr int most_orders = 64;
+
+// What the kernels are given of a stretch of pairs: slots, and directions with a sign.
+struct PairBatch {
+    std::vector<uint32_t> slot;
+    std::vector<float> x, y, z;
+
+    void clear() {
+        for (auto* axis : {&x, &y, &z}) axis->clear();
+        slot.clear();
+    }
+    void add(const DirectionArrays& directions, uint32_t direction, float sign, size_t at) {
+        slot.push_back(static_cast<uint32_t>(at));
+        x.push_back(sign * directions.x[direction]);
+        y.push_back(sign * directions.y[direction]);
+        z.push_back(sign * directions.z[direction]);
+    }
+};
+
+class Sweep {
+  public:
+    Sweep(const PairGraph& graph, const Tile& tile, const SlotMaterial& material, const GraphSide& lights,
+          const GraphSide& views, int n_threads, const Monitor& monitor)
+        : graph_(graph),
+          tile_(tile),
+          material_(material),
+          lights_(lights),
+          views_(views),
+          n_threads_(n_threads),
+          monitor_(monitor),
+          columns_(lights.directions.x.size()),
+          core_area_(core_areas(tile)) {}
+
+    size_t size() const { return graph_.size() * columns_; }
+
+    // R_1.
+    void first_order(HugeFloats& radiance) const {
+        radiance.resize(size());
+        for_chunks([&](size_t begin, size_t end) {
+            PairBatch batch;
+            for (size_t e = begin; e < end; ++e)
+                batch.add(graph_.directions, graph_.direction[e], -1, graph_.seen[e] % tile_.n_slots());
+            float* out = &radiance[begin * columns_];
+            rows(batch, lights_.directions, out);
+            for (size_t e = begin; e < end; ++e, out += columns_) {
+                const float* g = lights_.visible->of(graph_.seen[e]) + lights_.first;
+                for (size_t c = 0; c < columns_; ++c) out[c] *= g[c];
+            }
+        });
+    }
+
+    // R_{k+1} from R_k, added to `total` if there is one.
+    void next_order(const HugeFloats& from, HugeFloats& to, HugeFloats* total, double& heaviest) const {
+        to.resize(size());
+        const int n_tasks = static_cast<int>(std::min<size_t>(256, tile_.n_unknowns()));
+        std::vector<float> largest(n_tasks, 0.0f);
+        parallel_for(n_tasks, n_threads_, [&](int task) {
+            monitor_.check_cancelled();
+            PairBatch batch;
+            DirectionArrays leaving;
+            std::vector<float> weights, cosines;
+            const size_t begin = tile_.n_unknowns() * task / n_tasks,
+                         end = tile_.n_unknowns() * (task + 1) / n_tasks;
+            for (size_t u = begin; u < end; ++u) {
+                const size_t arriving = graph_.in[u + 1] - graph_.in[u], first = graph_.out[u],
+                             n = graph_.out[u + 1] - first;
+                if (arriving == 0) continue;
+                const size_t slot = u % tile_.n_slots(), padded = (n + 15) / 16 * 16;
+                if (n > 0) {
+                    for (auto* axis : {&leaving.x, &leaving.y, &leaving.z}) axis->assign(padded, 0.0f);
+                    cosines.resize(n);
+                    for (size_t t = 0; t < n; ++t) {
+                        const uint32_t j = graph_.direction[first + t];
+                        leaving.x[t] = graph_.directions.x[j];
+                        leaving.y[t] = graph_.directions.y[j];
+                        leaving.z[t] = graph_.directions.z[j];
+                        cosines[t] = static_cast<float>(graph_.solid_angle) * cosine(slot, j);
+                    }
+                    batch.clear();
+                    for (size_t k = 0; k < arriving; ++k)
+                        batch.add(graph_.directions, graph_.direction[graph_.arriving[graph_.in[u] + k]], -1,
+                                  slot);
+                    weights.resize(arriving * padded);
+                    rows(batch, leaving, weights.data());
+                }
+                for (size_t k = 0; k < arriving; ++k) {
+                    float* w = weights.data() + k * padded;
+                    for (size_t t = 0; t < n; ++t) {
+                        w[t] *= cosines[t];
+                        largest[task] = std::max(largest[task], w[t]);
+                    }
+                    const size_t e = graph_.arriving[graph_.in[u] + k];
+                    combine_rows(w, n, from.data() + first * columns_, columns_, &to[e * columns_],
+                                 total ? &(*total)[e * columns_] : nullptr);
+                }
+            }
+        });
+        for (const float w : largest) heaviest = std::max(heaviest, static_cast<double>(w));
+    }
+
+    // What the views receive.
+    Matrix received(const HugeFloats& radiance) const {
+        [[maybe_unused]] static const bool single_threaded_blas = (openblas_set_num_threads(1), true);
+        const size_t padded = views_.directions.x.size(), panel = columns_ * padded;
+        const size_t n_chunks = (graph_.size() + chunk_pairs - 1) / chunk_pairs;
+        const int n_groups =
+            static_cast<int>(std::clamp<size_t>((size_t{64} << 20) / (panel * sizeof(double)), 2, 16));
+        std::vector<std::vector<double>> partial(n_groups);
+        parallel_for(n_groups, n_threads_, [&](int group) {
+            partial[group].assign(panel, 0.0);
+            std::vector<float> y, product(panel);
+            PairBatch batch;
+            for (size_t k = n_chunks * group / n_groups; k < n_chunks * (group + 1) / n_groups; ++k) {
+                monitor_.check_cancelled();
+                const size_t begin = k * chunk_pairs, end = std::min(begin + chunk_pairs, graph_.size());
+                batch.clear();
+                for (size_t e = begin; e < end; ++e)
+                    batch.add(graph_.directions, graph_.direction[e], 1, graph_.start[e] % tile_.n_slots());
+                y.resize((end - begin) * padded);
+                rows(batch, views_.directions, y.data());
+                for (size_t e = begin; e < end; ++e) {
+                    const size_t slot = batch.slot[e - begin];
+                    const float weight = core_area_[slot] * static_cast<float>(graph_.solid_angle) *
+                                         cosine(slot, graph_.direction[e]);
+                    const float* g = views_.visible->of(graph_.start[e]) + views_.first;
+                    float* row = &y[(e - begin) * padded];
+                    for (size_t c = 0; c < padded; ++c) row[c] *= weight * g[c];
+                }
+                cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, static_cast<int>(columns_),
+                            static_cast<int>(padded), static_cast<int>(end - begin), 1.0f,
+                            &radiance[begin * columns_], static_cast<int>(columns_), y.data(),
+                            static_cast<int>(padded), 0.0f, product.data(), static_cast<int>(padded));
+                for (size_t c = 0; c < panel; ++c) partial[group][c] += product[c];
+            }
+        });
+        Matrix sum(lights_.directions.n, views_.directions.n);
+        for (int l = 0; l < sum.rows; ++l)
+            for (int v = 0; v < sum.columns; ++v)
+                for (const auto& p : partial) sum(l, v) += p[l * padded + v];
+        return sum;
+    }
+
+    // Light that arrives on facets over all lights: of one order, from about 20,000 of the pairs; and direct.
+    double arrived(const HugeFloats& radiance) const {
+        const size_t step = 1 + graph_.size() / 20000;
+        double total = 0;
+        for (size_t e = 0; e < graph_.size(); e += step) {
+            const size_t slot = graph_.start[e] % tile_.n_slots();
+            const float* row = &radiance[e * columns_];
+            float sum = 0;
+            for (size_t c = 0; c < columns_; ++c) sum += row[c];
+            total += static_cast<double>(tile_.sqrt_area[slot]) * tile_.sqrt_area[slot] *
+                     cosine(slot, graph_.direction[e]) * sum;
+        }
+        return total * graph_.solid_angle * static_cast<double>(step);
+    }
+    double arrived_directly() const {
+        double total = 0;
+        for (size_t u = 0; u < tile_.n_unknowns(); ++u) {
+            const float* row = lights_.visible->of(u) + lights_.first;
+            float sum = 0;
+            for (size_t c = 0; c < columns_; ++c) sum += row[c];
+            const double root = tile_.sqrt_area[u % tile_.n_slots()];
+            total += root * root * sum;
+        }
+        return total;
+    }
+
+  private:
+    float cosine(size_t slot, uint32_t direction) const {
+        return std::max(0.0f, tile_.normal_x[slot] * graph_.directions.x[direction] +
+                                  tile_.normal_y[slot] * graph_.directions.y[direction] +
+                                  tile_.normal_z[slot] * graph_.directions.z[direction]);
+    }
+    void rows(const PairBatch& batch, const DirectionArrays& directions, float* out) const {
+        lobe_rows(material_, tile_, batch.slot.size(), batch.slot.data(), batch.x.data(), batch.y.data(),
+                  batch.z.data(), directions, out);
+    }
+    template <class Work>
+    void for_chunks(Work&& work) const {
+        const size_t n_chunks = (graph_.size() + chunk_pairs - 1) / chunk_pairs;
+        parallel_for(static_cast<int>(n_chunks), n_threads_, [&](int k) {
+            monitor_.check_cancelled();
+            work(k * chunk_pairs, std::min((k + 1) * chunk_pairs, graph_.size()));
+        });
+    }
+
+    const PairGraph& graph_;
+    const Tile& tile_;
+    const SlotMaterial& material_;
+    const GraphSide &lights_, &views_;
+    int n_threads_;
+    const Monitor& monitor_;
+    size_t columns_;
+    std::vector<float> core_area_;
+};
+
+}  // namespace
+
+GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                           const GraphSide& lights, const GraphSide& views, const GraphOptions& options,
+                           int n_threads, const Monitor& monitor) {
+    const Sweep sweep(graph, tile, material, lights, views, n_threads, monitor);
+    GraphOrders result;
+    HugeFloats radiance, next, total;
+    sweep.first_order(radiance);
+    if (!options.keep_orders) total = radiance;
+    const double direct = sweep.arrived_directly();
+    double before = direct, now = sweep.arrived(radiance);
+    const int most = options.max_order > 0      ? options.max_order - 1
+                     : options.fixed_orders > 0 ? options.fixed_orders
+                                                : most_orders;
+    for (result.n_orders = 1;; ++result.n_orders) {
+        if (options.keep_orders) result.orders.push_back(sweep.received(radiance));
+        result.ratio = before > 0 ? now / before : 0.0;
+        const double decline = std::min(result.ratio, 0.95),
+                     left = direct > 0 ? now * decline / (1 - decline) / direct : 0.0;
+        if (options.max_order == 0) result.remainder = left;
+        if (result.n_orders >= most || (options.fixed_orders == 0 && left < options.tolerance)) break;
+        sweep.next_order(radiance, next, options.keep_orders ? nullptr : &total, result.heaviest);
+        std::swap(radiance, next);
+        before = now;
+        now = sweep.arrived(radiance);
+    }
+    if (!options.keep_orders) result.orders.push_back(sweep.received(total));
+    return result;
+}
+
+double scatter_bytes(double n_pairs, int n_lights, int n_views) {
+    const auto padded = [](int n) { return (n + 15) / 16 * 16.0; };
+    return n_pairs * padded(n_lights) * 4 * 3 + padded(n_lights) * padded(n_views) * 8 * 16;
+}
+
+}  // namespace gonio
