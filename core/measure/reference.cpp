@@ -81,7 +81,8 @@ BrdfResult measure_reference(const HeightField& surface, const Material& materia
             ErrorCode::invalid_input, "/measure/outgoing", "directions",
             R"(mirrors need receivers of finite size: {"cells": "klems_full"} or {"cells": {"equal": 64}})");
     if (surface.base.is_curved())
-        throw Error(ErrorCode::invalid_input, "/base", "", "the path tracer's periodic scene has a flat base only");
+        throw Error(ErrorCode::invalid_input, "/base", "",
+                    "the path tracer's periodic scene has a flat base only");
     if (reference.paths < 1)
         throw Error(ErrorCode::invalid_input, "paths", std::to_string(reference.paths), "at least 1");
     if (plan.separate_orders && plan.max_order < 1)
