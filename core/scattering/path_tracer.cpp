@@ -301,15 +301,38 @@ PathTally PathTracer::trace(int view, const Vec3& wo, std::span<const Vec3> ligh
         else
             add_any(vertices, seen, wi, value);
         const double to_f = 1 / (pi * wi.z);
-        for (int stratum = 0; stratum < strata_per_block; ++stratum) {
-            const float *first = &value[2 * stratum * n_values()], *second = first + n_values();
-            for (size_t k = 0; k < n_values(); ++k) {
-                const double a = to_f * first[k], b = to_f * second[k];
-                tally.sum[l * n_values() + k] += a + b;
-                tally.squared_spread[l * n_values() + k] += (a - b) * (a - b);
-            }
+        add_strata(value, to_f, l * n_values(), tally);
+    }
+    return tally;
+}
+
+void PathTracer::add_strata(std::span<const float> value, double unit, size_t at, PathTally& tally) const {
+    for (int stratum = 0; stratum < strata_per_block; ++stratum) {
+        const auto first = value.subspan(2 * stratum * n_values(), n_values()),
+                   second = value.subspan((2 * stratum + 1) * n_values(), n_values());
+        for (size_t k = 0; k < n_values(); ++k) {
+            const double a = unit * first[k], b = unit * second[k];
+            tally.sum[at + k] += a + b;
+            tally.squared_spread[at + k] += (a - b) * (a - b);
         }
     }
+}
+
+PathTally PathTracer::trace_environment(int view, const Vec3& wo, const Environment& environment, int block,
+                                        const Monitor& monitor) const {
+    monitor.check_cancelled();
+    PathTally tally;
+    tally.sum.resize(n_values());
+    tally.squared_spread.resize(n_values());
+    std::vector<float> value(size_t{2} * strata_per_block * n_values()), light(n_channels_);
+    const auto scatter = [&](const Vertex& vertex) { return sample(vertex, facet(vertex.hit)); };
+    const auto escape = [&](int path, int order, const Vec3& direction, std::span<const float> throughput) {
+        for (int c = 0; c < n_channels_; ++c)
+            light[c] = throughput[c] * static_cast<float>(environment.at(c, direction));
+        add_to_path(light, order, std::span(value).subspan(path * n_values(), n_values()));
+    };
+    walk(view, wo, block, tally.rays, scatter, escape);
+    add_strata(value, 1, 0, tally);
     return tally;
 }
 

@@ -24,6 +24,7 @@
 #include "directions/direction.h"
 #include "material/facet_brdf.h"
 #include "scattering/embree_scene.h"
+#include "scattering/environment.h"
 #include "surface/height_field.h"
 
 namespace gonio {
@@ -70,6 +71,12 @@ class PathTracer {
     PathTally trace_into_cells(int light, const Vec3& wi, std::span<const ReceiverCell> cells, int block,
                                const Monitor& monitor) const;
 
+    // The view under an environment alone: sum is of the radiance that it sees, [slice][channel]. Paths look
+    // the light up where they escape, so that every reflectance is met, mirrors too; small bright sources are
+    // met by chance, and are noise. environment: a channel for each of the material's.
+    PathTally trace_environment(int view, const Vec3& wo, const Environment& environment, int block,
+                                const Monitor& monitor) const;
+
     // f = scale() * sum, standard error = scale() * sqrt(squared_spread).
     double scale() const;
 
@@ -83,6 +90,8 @@ class PathTracer {
     void walk(int stream, const Vec3& from, int block, RayCounts& counts, Scatter&& scatter,
               Escape&& escape) const;
     std::optional<Vec3> sample(const Vertex& vertex, const FacetBrdf& facet) const;
+    // Adds the paths' values, [path][slice][channel], each times `unit`, to the tally's entries from `at` on.
+    void add_strata(std::span<const float> value, double unit, size_t at, PathTally& tally) const;
     int paths_of(int block) const;
     FacetBrdf facet(const SceneHit& hit) const { return {material_, surface_, hit.kind, hit.i, hit.j}; }
     void add_lambertian(const Vertices& vertices, std::span<const int> seen, const Vec3& wi,
