@@ -1,4 +1,6 @@
 // Forward tracing into cells: closed forms, energy, and agreement with photons on Embree.
+#include "scattering/forward.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -148,7 +150,8 @@ TEST(Forward, OrdersAddUpAndALimitLeavesOutTheRest) {
 }
 
 TEST(Forward, AgreesWithPhotonsOnEmbree) {
-    const HeightField surface = rough();
+    HeightField surface = rough();
+    surface.pitch_y *= 1.4;
     const std::vector<ReceiverCell> cells = equal_cells(64);
     BrdfPlan plan = cell_plan(cells, lights, 4, 8);
     plan.separate_orders = true;
@@ -266,6 +269,29 @@ TEST(Forward, SameBitsOnAnyNumberOfThreads) {
     const Table three = measure_brdf(rough(), perfect_mirror(), plan, options).table;
     EXPECT_EQ(one.f, three.f);
     EXPECT_EQ(one.se, three.se);
+}
+
+// Large reliefs are started from some of their blocks: those of all phases together are the whole.
+TEST(Forward, BlocksAddUpToTheWhole) {
+    const HeightField surface = rough(96, 96);
+    const MarchGrid march = make_march_grid(surface);
+    const std::vector<ReceiverCell> cells = equal_cells(20);
+    const Material material = perfect_mirror();
+    const ForwardScene scene(surface, march, material, cells);
+    const Vec3 light = to_vector({55, 20});
+    ForwardSettings settings;
+    settings.sub_samples = {{0.3, 0.8}};
+    const ForwardTally whole = trace_light(scene, light, settings, 1, 1, 0, {});
+    std::vector<double> sum(cells.size(), 0.0);
+    settings.block_step = 3;
+    for (settings.first_block = 0; settings.first_block < 3; ++settings.first_block) {
+        const ForwardTally part = trace_light(scene, light, settings, 1, 1, 0, {});
+        EXPECT_LT(part.rays, 0.5 * whole.rays);
+        for (size_t cell = 0; cell < cells.size(); ++cell)
+            sum[cell] += part.share[0][cell] * part.projected / 3;
+    }
+    for (size_t cell = 0; cell < cells.size(); ++cell)
+        EXPECT_NEAR(sum[cell], whole.share[0][cell] * whole.projected, 1e-6);
 }
 
 // A relief of one column is simulated with its axes exchanged: what leaves must come back to where it

@@ -178,6 +178,36 @@ TEST(GridTracer, FindsTheOtherWallOfAGroove) {
     }
 }
 
+// From above, across a groove so wide that falling rays jump most of their way. The first crossing by small
+// steps in double.
+TEST(GridTracer, FallingRaysJumpNoFurtherThanTheyMay) {
+    constexpr int period = 128, n = 400;
+    const HeightField surface = generate_v_groove(period, period * 1e-6, 10);
+    const TraceGrid grid = make_trace_grid(surface);
+    const auto height = [&](double x) {  // between the nodes of a groove whose edges lie on nodes
+        return grid.lowest + std::tan(radians(10)) * std::abs(x - period * std::round(x / period));
+    };
+    RayBatch rays;
+    rays.reserve(n);
+    for (int k = 0; k < n; ++k) {
+        const auto w = random_words(6, 2, k);
+        const double side = k % 2 ? 1 : -1;
+        rays.add(grid, static_cast<int>(w[0] % period), 0, uniform_float(w[1]), 0.3f,
+                 grid.highest + uniform_float(w[2]), {side, 0.3, -0.01 - 0.5 * uniform_double(w[3])}, k);
+    }
+    const RayBatch started = rays;
+    const Traced t = trace(grid, rays);
+    ASSERT_EQ(t.hits.n, static_cast<size_t>(n));
+    for (size_t h = 0; h < t.hits.n; ++h) {
+        const int k = t.hits.id[h];
+        const double x0 = static_cast<double>(started.i[k]) + started.u[k];
+        double travel = 0;
+        while (started.z[k] + started.dz[k] * travel > height(x0 + started.dx[k] * travel)) travel += 1e-3;
+        const double x = x0 + started.dx[k] * travel, found = static_cast<double>(t.hits.i[h]) + t.hits.u[h];
+        EXPECT_NEAR(std::remainder(x - found, period), 0, 0.01) << k;
+    }
+}
+
 TEST(GridTracer, RaysAlongAxesAndStraightUpAndDown) {
     const HeightField surface = rough(20, 20);
     const TraceGrid grid = make_trace_grid(surface);
