@@ -45,6 +45,9 @@ BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOpti
 }  // namespace
 
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference) {
+    if (job.base.is_curved() && !std::holds_alternative<BrdfPlan>(job.plan))
+        throw Error(ErrorCode::invalid_input, "/base", "",
+                    "only measurements of kind \"brdf\" know curved bases");
     LoadedJob loaded{job, load_surface(job.surface, job.base), {}, reference};
     loaded.material = load_material(job.material, job.surface, loaded.surface);
     const ReferenceOptions* options = reference ? &*reference : nullptr;

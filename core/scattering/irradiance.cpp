@@ -6,6 +6,7 @@
 
 #include "base/parallel.h"
 #include "scattering/kernels.h"
+#include "visibility/corrected_horizon.h"
 #include "visibility/march.h"
 
 namespace gonio {
@@ -50,9 +51,13 @@ void expand_directions(const MarchGrid& grid, const Tile& tile, const std::vecto
                     return;
                 }
                 const FacetPoint point = facet_point(kind, sample.a, sample.b, tile.refinement, part);
+                counts.marched += rays;
+                if (grid.base.corrects_horizons()) {
+                    corrected_visible(grid, d, point, tile.area, to);
+                    return;
+                }
                 const RayBundle bundle = make_ray_bundle(grid, d, point, max_march_travel);
                 march_visible(grid, bundle, tile.area, to);
-                counts.marched += rays;
                 counts.truncated += bundle.truncated;
             });
             constexpr size_t chunk = 1024;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
+#include "scattering/moved_directions.h"
 #include "scattering/ray_hits.h"
 #include "visibility/curvature.h"
 #include "visibility/march.h"
@@ -43,9 +44,9 @@ Turning turning_along(const MarchGrid& grid, const Vec3& direction) {
 struct OperatorBundle {
     RayBundle rays;
     Vec3 direction;
-    double weight;  // solid angle / (2 pi) times the number of parts: half of the symmetric link
-    int kind, part;
-    Turning turning = {};  // on a curved base
+    double weight;          // solid angle / (2 pi) times the number of parts: half of the symmetric link
+    int kind, part, index;  // of the direction in its set
+    Turning turning = {};   // on a curved base
 };
 
 // Lines of cells that are marched together. Bundles that march transposed run along y.
@@ -58,12 +59,14 @@ struct LineGroup {
 struct PendingLink {
     uint32_t start;  // of the ray: line * width + position inside its group of lines
     Link link;
-    LinkTurn turn;
+};
+struct PendingLinks {
+    std::vector<PendingLink> links;
+    std::vector<LinkOrigin> origins;  // parallel, on a curved base
 };
 
 void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<OperatorBundle>& bundles,
-                 const LineGroup& group, HitLines& lines, std::vector<PendingLink>& pending,
-                 LinkOperator& counts) {
+                 const LineGroup& group, HitLines& lines, PendingLinks& pending, LinkOperator& counts) {
     constexpr uint32_t nothing = ~0u;
     const int width = group.transposed ? tile.area.height : tile.area.width, words = words_for(width);
     const uint32_t n_slots = static_cast<uint32_t>(tile.n_slots());
@@ -105,7 +108,7 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
                         const int kind = group.transposed ? 1 - facet.kind : facet.kind;
                         seen_slot = static_cast<uint32_t>(tile.slot(kind, hit_row, hit_column));
                         seen = seen_slot;
-                        travel = (bundle.rays.facets[k - 1].travel + facet.travel) / 2.0;
+                        if (curved) travel = (bundle.rays.facets[k - 1].travel + facet.travel) / 2.0;
                         if (tile.refinement > 1)
                             seen += n_slots *
                                     static_cast<uint32_t>(hit_part(
@@ -128,10 +131,8 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
                         from > 0 && to > 0
                             ? 2 * from * to / (tile.sqrt_area[slot] * from + tile.sqrt_area[seen_slot] * to)
                             : 0.0f;
-                    pending.push_back({static_cast<uint32_t>(line * width + position),
-                                       {seen, weight},
-                                       {{static_cast<float>(travel * bundle.turning.about[0]),
-                                         static_cast<float>(travel * bundle.turning.about[1])}}});
+                    pending.links.push_back({static_cast<uint32_t>(line * width + position), {seen, weight}});
+                    if (curved) pending.origins.push_back({bundle.index, static_cast<float>(travel)});
                 }
             }
         }
@@ -140,11 +141,11 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
 
 // Groups the pending links by the unknown they start from (counting sort, stable: the order of the directions
 // stays).
-void append_records(const Tile& tile, const LineGroup& group, const std::vector<PendingLink>& pending,
-                    bool curved, LinkOperator::Chunk& chunk) {
+void append_records(const Tile& tile, const LineGroup& group, const std::vector<OperatorBundle>& bundles,
+                    const PendingLinks& pending, const BaseCurvature& base, LinkOperator::Chunk& chunk) {
     const int width = group.transposed ? tile.area.height : tile.area.width;
     std::vector<uint32_t> place(static_cast<size_t>(width) * group.n_lines, 0);
-    for (const PendingLink& p : pending) ++place[p.start];
+    for (const PendingLink& p : pending.links) ++place[p.start];
     uint32_t end = static_cast<uint32_t>(chunk.links.size());
     for (int line = 0; line < group.n_lines; ++line)
         for (int position = 0; position < width; ++position) {
@@ -161,11 +162,17 @@ void append_records(const Tile& tile, const LineGroup& group, const std::vector<
             count = begin;  // from now on: where the next link goes
         }
     chunk.links.resize(end);
-    if (curved) chunk.turns.resize(end);
-    for (const PendingLink& p : pending) {
-        const uint32_t at = place[p.start]++;
-        chunk.links[at] = p.link;
-        if (curved) chunk.turns[at] = p.turn;
+    if (base.is_curved()) chunk.turns.resize(end);
+    if (base.corrects_horizons()) chunk.origins.resize(end);
+    for (size_t k = 0; k < pending.links.size(); ++k) {
+        const uint32_t at = place[pending.links[k].start]++;
+        chunk.links[at] = pending.links[k].link;
+        if (!base.is_curved()) continue;
+        const LinkOrigin& origin = pending.origins[k];
+        const double* about = bundles[2 * origin.direction + group.kind].turning.about;
+        chunk.turns[at] = {
+            {static_cast<float>(origin.travel * about[0]), static_cast<float>(origin.travel * about[1])}};
+        if (base.corrects_horizons()) chunk.origins[at] = origin;
     }
 }
 
@@ -179,8 +186,12 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
     parallel_for(2 * n_directions, n_threads, [&](int task) {
         const int i = task / 2, kind = task % 2, part = i % n_parts;
         const FacetPoint point = facet_point(kind, jitter[i].a, jitter[i].b, tile.refinement, part);
-        bundles[task] = {make_ray_bundle(grid, set.directions[i], point, max_march_travel), set.directions[i],
-                         set.solid_angle[i] * n_parts / (2 * pi), kind, part};
+        bundles[task] = {make_ray_bundle(grid, set.directions[i], point, max_march_travel),
+                         set.directions[i],
+                         set.solid_angle[i] * n_parts / (2 * pi),
+                         kind,
+                         part,
+                         i};
         if (grid.base.is_curved()) bundles[task].turning = turning_along(grid, set.directions[i]);
     });
 
@@ -204,15 +215,17 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
     parallel_for(n_chunks, n_threads, [&](int c) {
         monitor.check_cancelled();
         HitLines lines;
-        std::vector<PendingLink> pending;
+        PendingLinks pending;
         for (size_t g = static_cast<size_t>(c) * groups_per_chunk;
              g < std::min(groups.size(), static_cast<size_t>(c + 1) * groups_per_chunk); ++g) {
-            pending.clear();
+            pending.links.clear();
+            pending.origins.clear();
             trace_group(grid, tile, bundles, groups[g], lines, pending, counts[c]);
-            append_records(tile, groups[g], pending, grid.base.is_curved(), op.chunks[c]);
+            append_records(tile, groups[g], bundles, pending, grid.base, op.chunks[c]);
         }
         op.chunks[c].records.push_back({0, static_cast<uint32_t>(op.chunks[c].links.size())});
     });
+    if (grid.base.corrects_horizons()) weigh_moved_directions(grid, tile, set, n_threads, op);
     for (int c = 0; c < n_chunks; ++c) {
         op.rays += counts[c].rays;
         op.substituted += counts[c].substituted;

@@ -11,6 +11,12 @@
 
 namespace gonio {
 
+// Which ray found a link.
+struct LinkOrigin {
+    int direction;  // of the set
+    float travel;   // cells to what is seen
+};
+
 // K of the irradiance equation E = E_direct + albedo K E on facet parts of constant irradiance, in the basis
 // scaled by sqrt(area), where exact transport is self-adjoint. The sampled one is, too: each line found
 // between two facets counts both ways, weighed by the balance heuristic (link_operator.cpp), so tables are
@@ -20,6 +26,8 @@ struct LinkOperator {
         std::vector<LinkRecord> records;  // one more than there are: its end
         std::vector<Link> links;
         std::vector<LinkTurn> turns;  // parallel to links on a curved base, else empty
+        std::vector<LinkOrigin>
+            origins;  // parallel to links where a flat base tells what is seen, else empty
     };
     std::vector<Chunk> chunks;
     double rays = 0, links = 0;

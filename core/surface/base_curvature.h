@@ -12,11 +12,22 @@
 
 namespace gonio {
 
+// How it is found what the bent base hides.
+enum class BaseCorrection {
+    none,    // rays are bent: nothing is assumed
+    exact,   // what a flat base hides stays hidden: its horizons are corrected, exactly (Onoue, Max, Nishita 2004) ...
+    printed  // ... or as printed there, to first order; and scattering directions move with their ends (Heidrich et al. 2000)
+};
+
 struct BaseCurvature {
     double kappa_1 = 0, kappa_2 = 0;  // 1/m; above 0 convex (the normals fan out), below 0 hollow
     double direction = 0;             // of kappa_1, radians from x
 
+    BaseCorrection correction = BaseCorrection::none;
+
     bool is_curved() const { return kappa_1 != 0 || kappa_2 != 0; }
+    bool bends_rays() const { return is_curved() && correction == BaseCorrection::none; }
+    bool corrects_horizons() const { return is_curved() && correction != BaseCorrection::none; }
     bool operator==(const BaseCurvature&) const = default;
 
     // Second fundamental form K in the frame of the grid.
@@ -36,7 +47,11 @@ struct BaseCurvature {
         return std::abs(kappa) < 1e-12 * (std::abs(kappa_1) + std::abs(kappa_2)) ? 0 : kappa;
     }
     // The same base with x and y exchanged.
-    BaseCurvature axes_swapped() const { return {kappa_1, kappa_2, std::acos(0.0) - direction}; }
+    BaseCurvature axes_swapped() const {
+        BaseCurvature swapped = *this;
+        swapped.direction = std::acos(0.0) - direction;
+        return swapped;
+    }
 };
 
 }  // namespace gonio

@@ -72,6 +72,7 @@ std::string surface_hash(const HeightField& s) {
     const double pitches[] = {s.pitch_x, s.pitch_y};
     std::vector<double> base;  // a flat one leaves no trace
     if (s.base.is_curved()) base = {s.base.kappa_1, s.base.kappa_2, s.base.direction};
+    if (s.base.corrects_horizons()) base.push_back(static_cast<double>(s.base.correction));
     return sha256_hex({bytes_of(sizes, 4), bytes_of(pitches, 2), bytes_of(s.heights.data(), s.heights.size()),
                        bytes_of(base.data(), base.size())});
 }

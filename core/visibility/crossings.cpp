@@ -176,8 +176,10 @@ int facet_part(int kind, double u, double v, int refinement) {
     return p * p + 2 * q + (upper ? 1 : 0);
 }
 
-RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
-                          double max_travel) {
+namespace {
+
+RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                      double max_travel, bool bends) {
     RayBundle bundle;
     bundle.direction = to_march_direction(grid, direction);
     bundle.start = start;
@@ -194,7 +196,7 @@ RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const Fa
     for (int k = 0; k < 3; ++k) bundle.start_weight[k] = static_cast<float>(weights[kind][k]);
 
     std::optional<Bend> bend;
-    if (grid.base.is_curved()) {
+    if (bends) {
         const double x = bundle.transposed ? dy : dx,
                      y = (bundle.transposed ? dx : dy) * grid.pitch_y / grid.pitch_x,
                      kappa = grid.pitch_x * grid.base.along(x, y), length = std::hypot(x, y);
@@ -239,6 +241,18 @@ RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const Fa
     }
     bundle.groups = group_crossings(list, bundle.crossings, rise, bend, plane.nx, plane.ny);
     return bundle;
+}
+
+}  // namespace
+
+RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                          double max_travel) {
+    return make_bundle(grid, direction, start, max_travel, grid.base.bends_rays());
+}
+
+RayBundle make_level_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                            double max_travel) {
+    return make_bundle(grid, direction, start, max_travel, false);
 }
 
 }  // namespace gonio

@@ -79,4 +79,9 @@ struct RayBundle {
 RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
                           double max_travel);
 
+// The same for march_horizon, towards a horizontal direction and straight on any base: horizons are those of
+// the flat relief, which visibility/curvature.h corrects.
+RayBundle make_level_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
+                            double max_travel);
+
 }  // namespace gonio

@@ -26,7 +26,7 @@ HorizonSlice compute_horizon(const MarchGrid& grid, double azimuth, const FacetP
                              const HorizonOptions& options) {
     auto exact = [](double c) { return std::abs(c) < 1e-15 ? 0.0 : c; };
     const Vec3 direction{exact(std::cos(azimuth)), exact(std::sin(azimuth)), 0};
-    const RayBundle first_crossings = make_ray_bundle(grid, direction, receiver, near_travel);
+    const RayBundle first_crossings = make_level_bundle(grid, direction, receiver, near_travel);
     if (!options.exact && can_sweep(grid))
         return sweep_horizon(grid, first_crossings, reach(grid, first_crossings, options.smallest_slope));
 
@@ -34,7 +34,7 @@ HorizonSlice compute_horizon(const MarchGrid& grid, double azimuth, const FacetP
     HorizonSlice slice;
     slice.slope.resize(static_cast<size_t>(nx) * ny);
     slice.distance.resize(slice.slope.size());
-    march_horizon(grid, make_ray_bundle(grid, direction, receiver, max_horizon_travel), {0, 0, nx, ny},
+    march_horizon(grid, make_level_bundle(grid, direction, receiver, max_horizon_travel), {0, 0, nx, ny},
                   slice.slope.data(), slice.distance.data());
     return slice;
 }

@@ -36,7 +36,7 @@ void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int 
 
 // Horizon of every cell of the rectangle along the bundle's horizontal direction (its rise is not used):
 // largest (height of the relief - height of the start) / horizontal travel over the break points of the
-// profile, which is exact for the mesh; never below 0. slope is metric (tan of the elevation). slope[row *
+// profile, which is exact for the mesh; never below 0. Of the flat relief: see make_level_bundle. slope is metric (tan of the elevation). slope[row *
 // width + column] in untransposed cells. distance: horizontal, metres, to the break point that is the
 // horizon, 0 where none stands higher than the start; left out if null.
 void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, float* horizon_slope,

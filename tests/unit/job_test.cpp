@@ -356,6 +356,8 @@ TEST(JobHash, DependsOnWhateverDecidesTheResult) {
              {{"surface", {{"slope_deg", 44}}}},
              {{"base", {{"kappa_1", 20}, {"kappa_2", 0}}}},
              {{"base", {{"kappa_1", 20}, {"kappa_2", 20}}}},
+             {{"base", {{"kappa_1", 20}, {"kappa_2", 0}, {"correction", "exact"}}}},
+             {{"base", {{"kappa_1", 20}, {"kappa_2", 0}, {"correction", "printed"}}}},
              {{"base", {{"kappa_1", 20}, {"kappa_2", 0}, {"direction_deg", 30}}}},
              {{"material", {{"albedo", 0.7}}}},
              {{"material", {{"albedo", {0.8, 0.8, 0.8}}}}},

@@ -1,0 +1,143 @@
+#include "scattering/moved_directions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.h"
+#include "visibility/curvature.h"
+#include "visibility/direction_mesh.h"
+
+namespace gonio {
+namespace {
+
+// The directions that one part of the facets traces, closed to a sphere by directions that are too steep to
+// meet anything.
+struct Fans {
+    DirectionMesh mesh;
+    std::vector<Vec3> still;          // where they are on the flat base
+    std::vector<double> solid_angle;  // of their fans there
+    std::vector<int> place;           // of a direction of the set; -1 of another part
+};
+
+Fans make_fans(const DirectionSet& set, int part, int n_parts) {
+    Fans fans;
+    fans.place.assign(set.directions.size(), -1);
+    double z_max = 0;
+    for (size_t i = part; i < set.directions.size(); i += n_parts) {
+        fans.place[i] = static_cast<int>(fans.still.size());
+        fans.still.push_back(set.directions[i]);
+        z_max = std::max(z_max, std::abs(set.directions[i].z));
+    }
+    // As dense as the others; at least the poles and a ring below each.
+    const double n = static_cast<double>(fans.still.size());
+    const int n_caps = std::max(8, static_cast<int>(n * (1 - z_max) / std::max(z_max, 0.05)));
+    for (int k = 0; k < n_caps; ++k) {
+        const double z = 1 - (1 - z_max) * (2 * (k / 2) + 0.5) / n_caps * 0.999,
+                     phi = 2 * pi * fractional_part(0.6180339887498949 * k);
+        const double r = safe_sqrt(1 - z * z);
+        fans.still.push_back({r * std::cos(phi), r * std::sin(phi), k % 2 == 0 ? z : -z});
+    }
+    fans.mesh = triangulate(fans.still);
+    fan_solid_angles(fans.mesh, fans.still, fans.solid_angle);
+    return fans;
+}
+
+// Links of one unknown: they may stand in two chunks, by the axis along which they were marched.
+struct Record {
+    uint32_t unknown, chunk, begin, end;
+};
+
+Vec3 between(const Vec3& from, const Vec3& to) {
+    const Vec3 d{to.x - from.x, to.y - from.y, to.z - from.z};
+    const double length = std::sqrt(dot(d, d));
+    return {d.x / length, d.y / length, d.z / length};
+}
+
+}  // namespace
+
+void weigh_moved_directions(const MarchGrid& grid, const Tile& tile, const DirectionSet& set, int n_threads,
+                            LinkOperator& op) {
+    const int n_parts = tile.n_parts();
+    std::vector<Fans> fans(n_parts);
+    parallel_for(n_parts, n_threads, [&](int part) { fans[part] = make_fans(set, part, n_parts); });
+    std::vector<Record> records;
+    for (size_t c = 0; c < op.chunks.size(); ++c) {
+        const auto& list = op.chunks[c].records;
+        for (size_t r = 0; r + 1 < list.size(); ++r)
+            records.push_back({list[r].unknown, static_cast<uint32_t>(c), list[r].begin, list[r + 1].begin});
+    }
+    std::stable_sort(records.begin(), records.end(),
+                     [](const Record& a, const Record& b) { return a.unknown < b.unknown; });
+
+    const size_t n_slots = tile.n_slots();
+    // Metres above the mean: facets are small against the radius of the base, so their middle stands for
+    // them.
+    auto height = [&](size_t slot) {
+        const int kind = static_cast<int>(slot / (static_cast<size_t>(tile.area.height) * tile.stride)),
+                  row = static_cast<int>(slot / tile.stride) % tile.area.height,
+                  column = static_cast<int>(slot % tile.stride);
+        const MarchPlane& plane = grid.rows;
+        const float* node =
+            &plane.heights[static_cast<size_t>((tile.area.y0 + row) % plane.ny) * plane.stride +
+                           (tile.area.x0 + column) % plane.nx];
+        return grid.pitch_x *
+               (static_cast<double>(node[0]) + node[kind == 0 ? 1 : plane.stride] + node[plane.stride + 1]) /
+               3;
+    };
+    auto cosine = [&](const Vec3& d, size_t slot) {
+        return d.x * tile.normal_x[slot] + d.y * tile.normal_y[slot] + d.z * tile.normal_z[slot];
+    };
+    constexpr size_t records_together = 256;
+    const int n_tasks = static_cast<int>((records.size() + records_together - 1) / records_together);
+    parallel_for(n_tasks, n_threads, [&](int task) {
+        std::vector<Vec3> moved;
+        std::vector<double> solid_angle;
+        // From the first record of an unknown to the last of another, wherever the tasks' borders fall.
+        size_t r = task * records_together;
+        while (r > 0 && r < records.size() && records[r].unknown == records[r - 1].unknown) ++r;
+        const size_t task_end = std::min(records.size(), (task + 1) * records_together);
+        while (r < task_end) {
+            size_t end = r;
+            while (end < records.size() && records[end].unknown == records[r].unknown) ++end;
+            const size_t slot = records[r].unknown % n_slots;
+            const Fans& own = fans[records[r].unknown / n_slots];
+            const Vec3 from{0, 0, height(slot)};
+            auto each_link = [&](auto&& what) {
+                for (size_t k = r; k < end; ++k)
+                    for (uint32_t l = records[k].begin; l < records[k].end; ++l)
+                        what(op.chunks[records[k].chunk], l);
+            };
+            auto offset = [&](const LinkOrigin& origin) {
+                const MarchDirection step = to_march_direction(grid, set.directions[origin.direction]);
+                return Vec3{origin.travel * step.step_x * grid.pitch_x,
+                            origin.travel * step.step_y * grid.pitch_y, 0};
+            };
+            moved = own.still;
+            each_link([&](const LinkOperator::Chunk& chunk, uint32_t l) {
+                const Vec3 to = offset(chunk.origins[l]), d = set.directions[chunk.origins[l].direction];
+                const double rise = d.z * std::hypot(to.x, to.y) / std::hypot(d.x, d.y);
+                moved[own.place[chunk.origins[l].direction]] =
+                    between(from, displaced_position(grid.base, to.x, to.y, from.z + rise));
+            });
+            fan_solid_angles(own.mesh, moved, solid_angle);
+            each_link([&](LinkOperator::Chunk& chunk, uint32_t l) {
+                const LinkOrigin& origin = chunk.origins[l];
+                const int place = own.place[origin.direction];
+                const Vec3 to = offset(origin),
+                           arriving = turned_direction(moved[place], grid.base, to.x, to.y);
+                const size_t seen = chunk.links[l].seen % n_slots;
+                const double a = tile.sqrt_area[slot], b = tile.sqrt_area[seen];
+                const double leave = a * cosine(moved[place], slot), arrive = -b * cosine(arriving, seen);
+                const double importance = set.solid_angle[origin.direction] * n_parts / (2 * pi) *
+                                          std::max(0.0, solid_angle[place] / own.solid_angle[place]);
+                chunk.links[l].weight =
+                    leave > 0 && arrive > 0
+                        ? static_cast<float>(importance * 2 * leave * arrive / (a * leave + b * arrive))
+                        : 0.0f;
+            });
+            r = end;
+        }
+    });
+}
+
+}  // namespace gonio
