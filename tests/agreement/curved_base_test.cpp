@@ -7,6 +7,8 @@
 
 #include "agreement/curved_patch.h"
 #include "agreement/measured.h"
+#include "base/error.h"
+#include "measure/reference.h"
 #include "surface/generate.h"
 #include "validation/statistics.h"
 #include "visibility/march.h"
@@ -151,6 +153,24 @@ TEST(CorrectedHorizons, AgreeOnGentleBases) {
             EXPECT_LT(off(papers, truth, order), (order == 1 ? 0.05 : 0.65) * off(flat, truth, order));
         }
     }
+}
+
+TEST(CurvedBaseRefuses, WhatItCannotDo) {
+    const BrdfPlan plan = plan_for_target({{30, 0}}, {{0, 0}}, 0.01);
+    auto field = [&](auto&& what) {
+        try {
+            what();
+        } catch (const Error& error) {
+            return error.field();
+        }
+        return std::string("nothing");
+    };
+    const HeightField bent = relief({0.01, 0, 0});
+    EXPECT_EQ(field([&] { measure_reference(bent, gray({0.5}), plan, {16}, {}); }), "/base");
+    EXPECT_EQ(field([&] { measure_brdf(bent, Material({"y"}, Phong{10.0, 0.5}), plan, {}); }), "/base");
+    // The relief is about 3 cells high and deep.
+    EXPECT_EQ(field([&] { measure_brdf(relief({0, 0.24, 0}), gray({0.5}), plan, {}); }), "/base/kappa_2");
+    EXPECT_EQ(field([&] { measure_brdf(relief({-0.24, 0, 0}), gray({0.5}), plan, {}); }), "/base/kappa_1");
 }
 
 TEST(FlatBase, KappaZeroIsTheFlatEngine) {

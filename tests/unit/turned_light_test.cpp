@@ -123,7 +123,7 @@ TEST(LinkTurns, GrowWithTheCurvature) {
         std::vector<SubSample> jitter(32, {0.4, 0.3});
         return rms_turn(build_link_operator(grid, tile, slab_directions(32, 0.8, 0.1, 0.2), jitter, 1, {}));
     };
-    EXPECT_NEAR(turn(2e-6) / turn(1e-6), 2, 0.01);
+    EXPECT_NEAR(turn(2e-6) / turn(1e-6), 2, 0.05);
 }
 
 }  // namespace
