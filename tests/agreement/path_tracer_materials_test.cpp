@@ -239,6 +239,10 @@ TEST(PathTracerCells, MirrorGrooveReflectsBack) {
                     << i << " " << o;
             }
     }
+    // After one bounce all light is still inside.
+    const Table first =
+        trace(generate_v_groove(8, 2, 45), mirror, in_orders(cell_plan({{0, 0}}, cells), 1), 512);
+    for (const float f : first.f) EXPECT_EQ(f, 0);
 }
 
 // Nothing is absorbed: what arrives leaves into the cells.
