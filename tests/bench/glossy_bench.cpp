@@ -3,7 +3,7 @@
 // the cosine-weighted rms over the table, over its mean, against a converged pair graph of other random
 // numbers; the path tracer's is its own rms distance from that over 8 of the views, carried to other path
 // counts as n^-1/2.
-//   glossy_bench [PATHS]
+//   glossy_bench [PATHS] [FIRST CASE]    PATHS 0: no path tracer
 #include <cstdio>
 #include <cstdlib>
 
@@ -99,9 +99,11 @@ void run(const Case& c, long long paths) {
 int main(int argc, char** argv) {
     using namespace gonio;
     const long long paths = argc > 1 ? std::atoll(argv[1]) : 4096;
-    run({"GGX 0.3", 0.5, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}}, paths);
-    run({"GGX 0.15", 0.5, {{"y"}, ggx(0.15)}, {1, 126, 1, 2}}, paths);
-    run({"GGX 0.3, slope 0.7", 0.7, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}}, paths);
-    run({"half diffuse, half GGX 0.2", 0.5, half_diffuse(0.2), {1, 54, 1, 2}}, 0);
-    run({"Lambert", 0.5, {{"y"}, Lambertian{0.8}}, {1, 54, 1, 2}}, 0);
+    const std::vector<Case> cases = {{"GGX 0.3", 0.5, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}},
+                                     {"GGX 0.15", 0.5, {{"y"}, ggx(0.15)}, {1, 126, 1, 2}},
+                                     {"GGX 0.3, slope 0.7", 0.7, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}},
+                                     {"half diffuse, half GGX 0.2", 0.5, half_diffuse(0.2), {1, 54, 1, 2}},
+                                     {"Lambert", 0.5, {{"y"}, Lambertian{0.8}}, {1, 54, 1, 2}}};
+    const size_t first = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 0;
+    for (size_t k = first; k < cases.size(); ++k) run(cases[k], paths);
 }
