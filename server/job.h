@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "material/material.h"
+#include "measure/btf.h"
+#include "measure/maps.h"
 #include "measure/plan.h"
 #include "surface/height_field.h"
 #include "surface/io/height_reader.h"
@@ -52,12 +54,11 @@ struct MaterialSource {
     HeightReader read = read_trusted_heights;
 };
 
-// What is measured. A new kind is one alternative here, one parser (server/README.md says where) and one
-// overload in run_job.cpp.
-using MeasurePlan = std::variant<BrdfPlan>;
+// What is measured. A new kind is one alternative here and one file: measure_kind.h.
+using MeasurePlan = std::variant<BrdfPlan, BtfPlan, MapsPlan, LightFieldPlan>;
 
 struct OutputRequest {
-    std::string format;  // one of table_formats()
+    std::string format;  // one of its kind's: "csv"
     std::string path;    // relative to the folder that the caller chooses
 };
 

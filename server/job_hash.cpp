@@ -4,13 +4,14 @@
 
 #include "base/sha256.h"
 #include "material/lobe_parameters.h"
+#include "server/canonical.h"
+#include "server/measure_kind.h"
 
 namespace gonio {
-namespace {
 
 using nlohmann::json;  // sorts its keys, writes doubles as the shortest text that reads back
 
-json angle_list(const std::vector<AnglesDeg>& directions) {
+json canonical(const std::vector<AnglesDeg>& directions) {
     json list = json::array();
     for (const AnglesDeg& a : directions) list.push_back({a.theta_deg, a.phi_deg});
     return list;
@@ -31,8 +32,8 @@ json canonical(const Accuracy& accuracy) {
 
 json canonical(const BrdfPlan& plan) {
     json j{{"kind", "brdf"},
-           {"incident", angle_list(plan.incident)},
-           {"outgoing", angle_list(plan.outgoing)},
+           {"incident", canonical(plan.incident)},
+           {"outgoing", canonical(plan.outgoing)},
            {"max_order", plan.max_order == 0 ? json("all") : json(plan.max_order)},
            {"orders", plan.separate_orders ? "separate" : "sum"},
            {"accuracy", canonical(plan.accuracy)}};
@@ -42,6 +43,8 @@ json canonical(const BrdfPlan& plan) {
         j["cells"].push_back({c.theta_min_deg, c.theta_max_deg, c.phi_min_deg, c.phi_max_deg});
     return j;
 }
+
+namespace {
 
 // One value or plane for each channel it may differ in: what is alike has one hash.
 void add_parameter(json& j, const std::string& name, const Parameter& parameter, size_t n_channels) {
@@ -111,7 +114,7 @@ std::string canonical_job(const std::string& surface_hash, const Material& mater
     json j{{"engine", program_version()},
            {"surface", surface_hash},
            {"material", canonical(material)},
-           {"measure", std::visit([](const auto& kind) { return canonical(kind); }, plan)}};
+           {"measure", kind_of(plan).canonical(plan)}};
     j["material"]["channels"] = material.channels;
     if (reference) j["reference"] = {{"paths", reference->paths}};
     return j.dump();

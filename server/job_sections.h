@@ -14,6 +14,8 @@ Accuracy parse_accuracy(const std::optional<JsonNode>& node);   // parse_accurac
 std::vector<AnglesDeg> parse_directions(const JsonNode& node);  // parse_directions.cpp
 // Sets incident, outgoing and pairs of the plan from "incident" and "outgoing", or from "pairs_deg".
 void parse_direction_pairs(const JsonNode& measure, BrdfPlan& plan);     // parse_directions.cpp
+// "max_order" of a measurement: 0 for "all", which is the default.
+int parse_max_order(const JsonNode& measure);  // parse_brdf.cpp
 BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy);  // parse_brdf.cpp
 
 // `path` against `folder` unless it is absolute.

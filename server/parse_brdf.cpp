@@ -8,14 +8,6 @@ namespace {
 constexpr size_t max_rows = 1u << 28;
 constexpr uint64_t max_orders = 1000;
 
-int parse_max_order(const JsonNode& node) {
-    if (node.raw().is_string()) {
-        if (node.raw() != "all") node.refuse(R"(must be "all" or a whole number from 1)");
-        return 0;
-    }
-    return static_cast<int>(node.whole_number(1, max_orders));
-}
-
 TransportKind parse_transport(const JsonNode& node) {
     const std::string name = node.choice({"auto", "diffuse", "pair_graph", "forward"});
     if (name == "diffuse") return TransportKind::diffuse;
@@ -24,6 +16,16 @@ TransportKind parse_transport(const JsonNode& node) {
 }
 
 }  // namespace
+
+int parse_max_order(const JsonNode& measure) {
+    const auto node = measure.find("max_order");
+    if (!node) return 0;
+    if (node->raw().is_string()) {
+        if (node->raw() != "all") node->refuse(R"(must be "all" or a whole number from 1)");
+        return 0;
+    }
+    return static_cast<int>(node->whole_number(1, max_orders));
+}
 
 BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
     measure.allow_keys({"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders", "transport"});
@@ -34,7 +36,7 @@ BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
         throw Error(ErrorCode::limit, measure.path(), std::to_string(rows) + " pairs of directions",
                     "at most " + std::to_string(max_rows));
     }
-    if (const auto order = measure.find("max_order")) plan.max_order = parse_max_order(*order);
+    plan.max_order = parse_max_order(measure);
     if (const auto orders = measure.find("orders"))
         plan.separate_orders = orders->choice({"sum", "separate"}) == "separate";
     if (const auto transport = measure.find("transport")) plan.transport = parse_transport(*transport);

@@ -107,6 +107,14 @@ const std::vector<DirectionForm> direction_forms = {
          node.at("klems").choice({"full"});
          return klems_full();
      }},
+    {"bonn",
+     [](const JsonNode& node) {
+         node.allow_keys({"bonn"});
+         const JsonNode size = node.at("bonn");
+         const uint64_t n = size.whole_number(1, 151);
+         if (n != 81 && n != 151) size.refuse("must be 81 or 151");
+         return n == 81 ? bonn_81() : bonn_151();
+     }},
 };
 
 // Receivers: {"cells": "klems_full"} or {"cells": {"equal": N}}.
@@ -147,7 +155,7 @@ std::vector<AnglesDeg> parse_directions(const JsonNode& node) {
     }
     node.refuse(
         R"(must be one of {"theta_deg": [...], "phi_deg": [...]}, {"list_deg": [[theta, phi], ...]}, )"
-        R"({"hemisphere": N} and {"klems": "full"})");
+        R"({"hemisphere": N}, {"klems": "full"} and {"bonn": 81})");
 }
 
 void parse_direction_pairs(const JsonNode& measure, BrdfPlan& plan) {

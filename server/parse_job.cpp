@@ -3,39 +3,26 @@
 
 #include "base/error.h"
 #include "server/job_sections.h"
-#include "table/io/table_io.h"
+#include "server/measure_kind.h"
 
 namespace gonio {
 namespace {
 
-struct MeasureKind {
-    std::string name;
-    MeasurePlan (*parse)(const JsonNode& measure, const Accuracy& accuracy);
-};
-
-// A new kind of measurement is one line here.
-const std::vector<MeasureKind> measure_kinds = {
-    {"brdf",
-     [](const JsonNode& measure, const Accuracy& accuracy) -> MeasurePlan {
-         return parse_brdf(measure, accuracy);
-     }},
-};
-
-MeasurePlan parse_measure(const JsonNode& measure, const Accuracy& accuracy) {
+const MeasureKind& parse_kind(const JsonNode& measure) {
     std::vector<std::string> names;
-    for (const MeasureKind& kind : measure_kinds) names.push_back(kind.name);
+    for (const MeasureKind& kind : measure_kinds()) names.push_back(kind.name);
     const std::string name = measure.at("kind").choice(names);
-    return measure_kinds[std::find(names.begin(), names.end(), name) - names.begin()].parse(measure,
-                                                                                            accuracy);
+    return measure_kinds()[std::find(names.begin(), names.end(), name) - names.begin()];
 }
 
-std::vector<OutputRequest> parse_outputs(const std::optional<JsonNode>& node, const std::string& job_name) {
-    if (!node) return {{"csv", job_name + ".csv"}};
+std::vector<OutputRequest> parse_outputs(const std::optional<JsonNode>& node, const MeasureKind& kind,
+                                         const std::string& job_name) {
+    if (!node) return {{kind.formats[0], job_name + "." + kind.formats[0]}};
     std::vector<OutputRequest> outputs(node->array_size());
     for (size_t i = 0; i < outputs.size(); ++i) {
         const JsonNode entry = node->element(i);
         entry.allow_keys({"format", "path"});
-        outputs[i].format = entry.at("format").choice(table_formats());
+        outputs[i].format = entry.at("format").choice(kind.formats);
         const std::optional<JsonNode> path = entry.find("path");
         outputs[i].path = path ? path->text() : job_name + "." + outputs[i].format;
         for (size_t earlier = 0; earlier < i; ++earlier) {
@@ -58,10 +45,13 @@ Job parse_job(std::string_view text, const JobOrigin& origin) {
     const nlohmann::json document = parse_json_strictly(text);
     const JsonNode root(document);
     root.allow_keys({"surface", "base", "material", "measure", "accuracy", "output"});
-    return {parse_surface(root.at("surface"), origin.folder),
-            parse_material(root.at("material"), origin.folder),
-            parse_measure(root.at("measure"), parse_accuracy(root.find("accuracy"))),
-            parse_outputs(root.find("output"), origin.name), parse_base(root.find("base"))};
+    SurfaceSource surface = parse_surface(root.at("surface"), origin.folder);
+    MaterialSource material = parse_material(root.at("material"), origin.folder);
+    const JsonNode measure = root.at("measure");
+    const MeasureKind& kind = parse_kind(measure);
+    return {std::move(surface), std::move(material),
+            kind.parse(measure, parse_accuracy(root.find("accuracy"))),
+            parse_outputs(root.find("output"), kind, origin.name), parse_base(root.find("base"))};
 }
 
 SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin) {

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "measure/prediction.h"
 #include "server/job_hash.h"
+#include "server/measure_kind.h"
 
 namespace gonio {
 namespace {
@@ -95,10 +95,7 @@ std::string planned_json(const LoadedJob& job, const JsonStyle& style) {
     j["job"] = ordered_json::parse(canonical_job(job.surface.hash, job.material, job.job.plan,
                                                  job.reference ? &*job.reference : nullptr));
     j["surface"] = to_json(job.surface);
-    const auto& plan = std::get<BrdfPlan>(job.job.plan);
-    const Prediction cost = job.reference
-                                ? predict_reference(job.surface.surface, job.material, plan, *job.reference)
-                                : predict_brdf(job.surface.surface, job.material, plan);
+    const Prediction cost = kind_of(job.job.plan).predict(job);
     j["prediction"] = {{"cpu_seconds", cost.cpu_seconds},
                        {"memory_bytes", cost.memory_bytes},
                        {"table_bytes", cost.table_bytes}};

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "server/job_hash.h"
+#include "server/measure_kind.h"
 #include "table/io/table_io.h"
 
 namespace gonio {
@@ -19,32 +20,20 @@ std::string size_of(const HeightField& surface) {
     return text;
 }
 
-BrdfResult run_plan(const LoadedJob& loaded, const BrdfPlan& plan, const RunOptions& options,
-                    const Monitor& monitor) {
-    BrdfResult result = loaded.reference
-                            ? measure_reference(loaded.surface.surface, loaded.material, plan,
-                                                *loaded.reference, options, monitor)
-                            : measure_brdf(loaded.surface.surface, loaded.material, plan, options, monitor);
-    const std::vector<std::pair<std::string, std::string>> origin = {
-        {"program", program_version()},
-        {"job_hash", loaded.hash},
-        {"surface_hash", loaded.surface.hash},
-        {"surface", size_of(loaded.surface.surface)},
-        {"seed", std::to_string(plan.accuracy.seed)},
-    };
-    result.table.provenance.insert(result.table.provenance.begin(), origin.begin(), origin.end());
-    if (const BaseCurvature& base = loaded.surface.surface.base; base.is_curved()) {
-        char text[120];
-        std::snprintf(text, sizeof text, "%.9g 1/m at %.9g degrees from x, %.9g 1/m across", base.kappa_1,
-                      degrees(base.direction), base.kappa_2);
-        result.table.provenance.emplace_back("base", text);
-    }
-    return result;
+void make_folder_of(const std::string& path) {
+    const auto folder = std::filesystem::path(path).parent_path();
+    if (folder.empty()) return;
+    std::error_code failure;
+    std::filesystem::create_directories(folder, failure);
+    if (failure) throw Error(ErrorCode::io, folder.string(), "", "cannot be made: " + failure.message());
 }
 
 }  // namespace
 
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference) {
+    if (reference && !std::holds_alternative<BrdfPlan>(job.plan))
+        throw Error(ErrorCode::invalid_input, "/measure/kind", kind_of(job.plan).name,
+                    "the path tracer measures brdf jobs only");
     if (job.base.is_curved() && !std::holds_alternative<BrdfPlan>(job.plan))
         throw Error(ErrorCode::invalid_input, "/base", "",
                     "only measurements of kind \"brdf\" know curved bases");
@@ -56,9 +45,41 @@ LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& refere
     return loaded;
 }
 
-BrdfResult run_job(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor) {
-    return std::visit([&](const auto& plan) { return run_plan(loaded, plan, options, monitor); },
-                      loaded.job.plan);
+Report run_job(const LoadedJob& loaded, const std::vector<OutputRequest>& files, const RunOptions& options,
+               const Monitor& monitor) {
+    const MeasureKind& kind = kind_of(loaded.job.plan);
+    if (options.shard_task.kind != ShardTask::Kind::compute_all &&
+        !std::holds_alternative<BrdfPlan>(loaded.job.plan))
+        throw Error(ErrorCode::invalid_input, "/measure/kind", kind.name,
+                    "only brdf jobs are cut into shards: gonio run");
+    for (const OutputRequest& file : files) make_folder_of(file.path);
+    return kind.run(loaded, files, options, monitor);
+}
+
+BrdfResult run_brdf(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor) {
+    const auto& plan = std::get<BrdfPlan>(loaded.job.plan);
+    BrdfResult result = loaded.reference
+                            ? measure_reference(loaded.surface.surface, loaded.material, plan,
+                                                *loaded.reference, options, monitor)
+                            : measure_brdf(loaded.surface.surface, loaded.material, plan, options, monitor);
+    const auto origin = job_provenance(loaded);
+    result.table.provenance.insert(result.table.provenance.begin(), origin.begin(), origin.end());
+    if (const BaseCurvature& base = loaded.surface.surface.base; base.is_curved()) {
+        char text[120];
+        std::snprintf(text, sizeof text, "%.9g 1/m at %.9g degrees from x, %.9g 1/m across", base.kappa_1,
+                      degrees(base.direction), base.kappa_2);
+        result.table.provenance.emplace_back("base", text);
+    }
+    return result;
+}
+
+std::vector<std::pair<std::string, std::string>> job_provenance(const LoadedJob& loaded) {
+    const uint64_t seed = std::visit([](const auto& plan) { return plan.accuracy.seed; }, loaded.job.plan);
+    return {{"program", program_version()},
+            {"job_hash", loaded.hash},
+            {"surface_hash", loaded.surface.hash},
+            {"surface", size_of(loaded.surface.surface)},
+            {"seed", std::to_string(seed)}};
 }
 
 std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::string& folder) {
@@ -74,12 +95,7 @@ std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::stri
 
 void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs) {
     for (const OutputRequest& output : outputs) {
-        if (const auto folder = std::filesystem::path(output.path).parent_path(); !folder.empty()) {
-            std::error_code failure;
-            std::filesystem::create_directories(folder, failure);
-            if (failure)
-                throw Error(ErrorCode::io, folder.string(), "", "cannot be made: " + failure.message());
-        }
+        make_folder_of(output.path);
         write_table(table, output.format, output.path);
     }
 }

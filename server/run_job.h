@@ -21,16 +21,25 @@ struct LoadedJob {
     std::string runs_hash = {};
 };
 
+// Throws Error, also for a reference of another kind than brdf.
 LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& reference = std::nullopt);
 
-// Runs it. table.provenance opens with program, job_hash, surface_hash, surface and seed; what the engine
-// chose follows.
-BrdfResult run_job(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor = {});
+// Runs a job of any kind and writes its files; missing folders are made. Throws Error, also for a kind
+// without shards if options.shard_task asks for some.
+Report run_job(const LoadedJob& loaded, const std::vector<OutputRequest>& files, const RunOptions& options,
+               const Monitor& monitor = {});
+
+// The table of a job of kind brdf, not yet written. Its provenance opens with job_provenance(); what the
+// engine chose follows.
+BrdfResult run_brdf(const LoadedJob& loaded, const RunOptions& options, const Monitor& monitor = {});
+
+// What every result says about where it comes from: program, job_hash, surface_hash, surface, seed.
+std::vector<std::pair<std::string, std::string>> job_provenance(const LoadedJob& loaded);
 
 // Where the outputs of a job go under `folder`; a reference writes "lava.reference.csv" for "lava.csv".
 std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::string& folder);
 
-// Writes every output; missing folders are made.
+// Writes every output of a table; missing folders are made.
 void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs);
 
 // Whether `path` is a result of this very job: its head carries the hash. Files are renamed into place whole,

@@ -15,6 +15,7 @@ using Action = std::function<int()>;
 
 void add_run(CLI::App& app, CommonOptions& common, Action& action);
 void add_measure(CLI::App& app, CommonOptions& common, Action& action);
+void add_expand(CLI::App& app, CommonOptions& common, Action& action);
 void add_batch(CLI::App& app, CommonOptions& common, Action& action);
 void add_info(CLI::App& app, CommonOptions& common, Action& action);
 void add_reference(CLI::App& app, CommonOptions& common, Action& action);

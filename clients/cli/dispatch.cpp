@@ -26,12 +26,16 @@ int run_dispatch(const DispatchedJob& dispatched, const CommonOptions& common) {
     const LoadedJob loaded = load_job(parse_job(text, origin), reference);
     const std::unique_ptr<Executor> executor = make_executor(dispatched.executor, dispatched.options);
     if (!common.quiet) print_surface(loaded.surface, std::cerr);
-    const RunJob run = [&](const LoadedJob&, const RunOptions& options, const Monitor& monitor) {
+    const RunJob run = [&](const LoadedJob&, const std::vector<OutputRequest>& outputs,
+                           const RunOptions& options, const Monitor& monitor) {
         const JobFolder folder(
             common.checkpoints, loaded, text, origin.folder,
             {dispatched.program.empty() ? this_program() : dispatched.program, dispatched.options.threads},
             options);
-        return dispatch(loaded, folder, *executor, options, monitor);
+        const BrdfResult result = dispatch(loaded, folder, *executor, options, monitor);
+        monitor.check_cancelled();
+        write_outputs(result.table, outputs);
+        return result.report;
     };
     const std::vector<OutputRequest> files = output_files(loaded, common.folder);
     print_result(loaded, run_and_write(loaded, files, common, {}, run), files, common);

@@ -46,11 +46,9 @@ Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& 
     RunOptions options = common.run_options();
     options.shard_task = task;
     if (!common.checkpoints.empty()) options.checkpoints = &checkpoints;
-    const BrdfResult result = run(loaded, options, monitor);
-    monitor.check_cancelled();
-    write_outputs(result.table, files);
+    Report report = run(loaded, files, options, monitor);
     if (!common.checkpoints.empty()) checkpoints.remove_all();
-    return result.report;
+    return report;
 }
 
 void print_result(const LoadedJob& loaded, const Report& report, const std::vector<OutputRequest>& files,

@@ -22,8 +22,9 @@ int execute_job(const Job& job, const CommonOptions& common,
 
 // The part of it behind loading: runs with a progress bar and writes the outputs. task: which shards are
 // computed (measure/shards.h, which says what is thrown), --checkpoints is where the others are found.
-// run: what computes the result, if not this process.
-using RunJob = std::function<BrdfResult(const LoadedJob&, const RunOptions&, const Monitor&)>;
+// run: what computes the result and writes the files, if not this process.
+using RunJob = std::function<Report(const LoadedJob&, const std::vector<OutputRequest>&, const RunOptions&,
+                                    const Monitor&)>;
 Report run_and_write(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
                      const CommonOptions& common, const ShardTask& task = {}, const RunJob& run = run_job);
 

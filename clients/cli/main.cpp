@@ -67,6 +67,7 @@ int main(int argc, char** argv) {
     gonio::add_measure(app, common, action);
     gonio::add_run(app, common, action);
     gonio::add_batch(app, common, action);
+    gonio::add_expand(app, common, action);
     gonio::add_info(app, common, action);
     gonio::add_reference(app, common, action);
     gonio::add_shard(app, common, action);

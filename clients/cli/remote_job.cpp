@@ -9,7 +9,10 @@
 #include "clients/cli/console.h"
 #include "clients/cli/execute.h"
 #include "clients/cli/interrupt.h"
+#include "server/btf_file.h"
 #include "server/json_node.h"
+#include "server/measure_kind.h"
+#include "server/service/temporary_folder.h"
 
 namespace gonio {
 namespace {
@@ -83,8 +86,19 @@ int execute_remotely(const std::string& path, const RemoteOptions& remote, const
     for (const OutputRequest& output : submitted.job.outputs) {
         const std::filesystem::path file = std::filesystem::path(common.folder) / output.path;
         if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-        write_file_atomically(file.lexically_normal().string(),
-                              [&](std::ostream& out) { service.fetch(id, "table", output.format, out); });
+        const std::string& product = kind_of(submitted.job.plan).output;
+        const auto fetch_to = [&](const std::string& target, const std::string& format) {
+            write_file_atomically(target,
+                                  [&](std::ostream& out) { service.fetch(id, product, format, out); });
+        };
+        if (output.format == "images") {  // a service sends a BTF in its factored form
+            const TemporaryFolder folder;
+            const std::string factored = (folder.path() / "factored").string();
+            fetch_to(factored, "btf");
+            expand_btf(factored, file.lexically_normal().string(), {{}, &interrupt_requested()});
+        } else {
+            fetch_to(file.lexically_normal().string(), output.format);
+        }
         if (!common.quiet) std::cerr << "wrote " << file.lexically_normal().string() << std::endl;
     }
     if (common.json) {

@@ -5,9 +5,9 @@ import { bytes } from "./format.js";
 
 const formatOf = (href) => new URL(href, location).searchParams.get("f");
 
-/** Formats of the output "table". */
+/** Formats of the output "table"; none of a job whose product is no table. */
 export function tableFormats(results) {
-    return results.table.map((one) => formatOf(one.href));
+    return (results.table ?? []).map((one) => formatOf(one.href));
 }
 
 // A link cannot carry the token, so the file is fetched and handed over.

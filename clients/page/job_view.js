@@ -6,19 +6,21 @@ import { followJob } from "./events.js";
 import { clock } from "./format.js";
 import { cancelButton, progressOf, statusPill } from "./jobs_view.js";
 import { loadResult } from "./result.js";
+import { makePictureView } from "./picture_view.js";
 import { card, makeResultView } from "./result_view.js";
 import { snippets } from "./snippets.js";
 
 function describe(document) {
     if (!document) return null;
     const { surface, material } = document;
+    if (!material) return "height map";
     return `${surface.generate ? surface.generate.replaceAll("_", " ") : "height map"}, albedo ${JSON.stringify(material.albedo)}`;
 }
 
 async function showResult(box, info) {
-    box.replaceChildren(element("p", { class: "quiet", role: "status" }, "Fetching the table …"));
+    box.replaceChildren(element("p", { class: "quiet", role: "status" }, "Fetching the result …"));
     const { results, report, document, table } = await loadResult(info);
-    const views = table.tooLarge
+    const views = !table ? makePictureView(results, report) : table.tooLarge
         ? element("p", { class: "card quiet" }, `The table has ${table.tooLarge}: too much to draw here. Download it below.`)
         : makeResultView(table, report);
     box.replaceChildren(element("p", { class: "quiet" }, describe(document)), views, element("div", { class: "stack" }, card("Files", downloads(results),

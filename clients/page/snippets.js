@@ -15,7 +15,8 @@ function curlLines(info, document, formats) {
 }
 
 // Python's own library alone: it runs where nothing was installed.
-function pythonLines(info, document) {
+function pythonLines(info, document, formats) {
+    const output = formats.length ? "table" : "report";
     const headers = hasToken() ? ', "Authorization": "Bearer " + os.environ["GONIO_TOKEN"]' : "";
     const lines = [`import json${hasToken() ? ", os" : ""}, urllib.request`, "", `server = "${location.origin}"`];
     lines.push("def call(path, body=None):",
@@ -26,10 +27,10 @@ function pythonLines(info, document) {
         lines.push(`inputs = json.loads(r'''${JSON.stringify(document)}''')`,
             `job = call("/processes/${info.processID}/execution", {"inputs": inputs})`,
             'while job["status"] in ("accepted", "running"):', '    time.sleep(1)', '    job = call("/jobs/" + job["jobID"])',
-            'table = call("/jobs/" + job["jobID"] + "/results/table")');
+            `${output} = call("/jobs/" + job["jobID"] + "/results/${output}")`);
         lines[0] += ", time";
     } else {
-        lines.push(`table = call("/jobs/${info.jobID}/results/table")`);
+        lines.push(`${output} = call("/jobs/${info.jobID}/results/${output}")`);
     }
     return lines.join("\n");
 }
@@ -41,5 +42,5 @@ function codeBlock(title, text) {
 
 /** `document`: of the job as accepted, or null if the server does not say it; `formats`: of its table. */
 export function snippets(info, document, formats) {
-    return element("div", {}, codeBlock("curl", curlLines(info, document, formats)), codeBlock("Python", pythonLines(info, document)));
+    return element("div", {}, codeBlock("curl", curlLines(info, document, formats)), codeBlock("Python", pythonLines(info, document, formats)));
 }

@@ -39,4 +39,29 @@ std::vector<AnglesDeg> klems_full() {
     return directions;
 }
 
+namespace {
+
+void add_ring(double theta_deg, int n, double first_step, std::vector<AnglesDeg>& directions) {
+    for (int k = 0; k < n; ++k) directions.push_back({theta_deg, 360 * (k + first_step) / n});
+}
+
+constexpr int bonn_rings[] = {6, 12, 18, 20, 24}, dome_rings_between[] = {6, 10, 14, 18, 22};
+
+}  // namespace
+
+std::vector<AnglesDeg> bonn_81() {
+    std::vector<AnglesDeg> directions{{0, 0}};
+    for (int ring = 0; ring < 5; ++ring) add_ring(15.0 * (ring + 1), bonn_rings[ring], 0, directions);
+    return directions;
+}
+
+std::vector<AnglesDeg> bonn_151() {
+    std::vector<AnglesDeg> directions{{0, 0}};
+    for (int ring = 0; ring < 5; ++ring) {
+        add_ring(15.0 * ring + 7.5, dome_rings_between[ring], 0.5, directions);
+        add_ring(15.0 * (ring + 1), bonn_rings[ring], 0, directions);
+    }
+    return directions;
+}
+
 }  // namespace gonio

@@ -19,4 +19,13 @@ std::vector<AnglesDeg> equal_projected_hemisphere(int n);
 // incident-azimuth turn of the XML files is the writer's).
 std::vector<AnglesDeg> klems_full();
 
+// The 81 directions of the BTF data bases of Bonn (2003) and of UTIA: theta 0, 15, ..., 75 degrees with 1, 6, 12, 18, 20, 24 azimuths
+// from 0 (Sattler, Sarlette and Klein 2003, table 1; shared/formats 2.10).
+std::vector<AnglesDeg> bonn_81();
+
+// 151 directions spread like the cameras of the Bonn dome (UBO2014): a pole and rings every 7.5 degrees to 75, whose azimuths alternate
+// by half a step: the rings of bonn_81 and 6, 10, 14, 18, 22 between them. The dome's own azimuths are calibrated and differ from file
+// to file: to match one, list its directions.
+std::vector<AnglesDeg> bonn_151();
+
 }  // namespace gonio

@@ -8,7 +8,7 @@ namespace gonio {
 struct Prediction {
     double cpu_seconds = 0;   // of one thread
     double memory_bytes = 0;  // at its peak, one run at a time
-    double table_bytes = 0;   // of values, standard errors and biases, as doubles
+    double table_bytes = 0;   // of the result; of tables: values, standard errors and biases, as doubles
 };
 
 // max_bytes: RunOptions::max_bytes, to which runs are cut.

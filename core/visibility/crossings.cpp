@@ -255,4 +255,11 @@ RayBundle make_level_bundle(const MarchGrid& grid, const Vec3& direction, const 
     return make_bundle(grid, direction, start, max_travel, false);
 }
 
+RayBundle make_view_bundle(const MarchGrid& grid, const Vec3& view, double u, double v, double max_travel) {
+    RayBundle bundle = make_ray_bundle(grid, {-view.x, -view.y, -view.z}, {u >= v ? 0 : 1, u, v}, max_travel);
+    bundle.from_above = true;
+    bundle.start_height = grid.highest;
+    return bundle;
+}
+
 }  // namespace gonio

@@ -72,6 +72,10 @@ struct RayBundle {
     // A ray has left once it has been above the highest point: what a hollow base does further away is
     // macroscopic, and the renderer's business. Crossing k is hit by no ray that starts above escape[k].
     std::vector<float> escape;  // parallel to crossings where the bundle is bent
+
+    // Rays of a view: they start at `start_height` (in cells) above their start points instead of on the relief, and fall.
+    bool from_above = false;
+    float start_height = 0;
 };
 
 // start.kind and start.u, v are in untransposed coordinates; the bundle holds transposed ones where it
@@ -83,5 +87,9 @@ RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const Fa
 // the flat relief, which visibility/curvature.h corrects.
 RayBundle make_level_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
                             double max_travel);
+
+// Rays that fall from the highest point of the relief along -view: `u`, `v` in [0, 1) is where, inside their cells, they pass that
+// height. view.z > 0. A ray that falls has hit by the end of its list unless it was cut (truncated).
+RayBundle make_view_bundle(const MarchGrid& grid, const Vec3& view, double u, double v, double max_travel);
 
 }  // namespace gonio

@@ -46,6 +46,11 @@ HWY_INLINE void start_rays(const Block& b, int offset, VF& height, M& front) {
     const D d;
     const MarchPlane& plane = *b.plane;
     const RayBundle& bundle = *b.bundle;
+    if (bundle.from_above) {
+        height = hn::Set(d, bundle.start_height);
+        front = hn::FirstN(d, hn::Lanes(d));
+        return;
+    }
     const float* p =
         plane.heights.data() + static_cast<size_t>(b.row) * plane.stride + b.column + b.lane + offset;
     const VF h00 = hn::LoadU(d, p), h10 = hn::LoadU(d, p + 1), h01 = hn::LoadU(d, p + plane.stride),
@@ -96,7 +101,8 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
     };
 
     if (!hn::AllFalse(d, hn::Or(active0, active1))) {
-        int k = 1;  // crossing 0 is the edge of the ray's own facet
+        // Crossing 0 is the edge of the ray's own facet, which only a ray from above can hit.
+        int k = bundle.from_above ? 0 : 1;
         for (const CrossingGroup& group : bundle.groups) {
             if (group.window >= 0) {
                 const float* w = node_at(plane, plane.window_max[group.window], b, group.column, group.row);

@@ -140,11 +140,15 @@ std::string cancel(Executor& executor, const JobFolder& job) {
 }  // namespace
 
 bool can_be_dispatched(const LoadedJob& loaded) {
-    return std::visit([](const auto& plan) { return !plan.accuracy.max_seconds; }, loaded.job.plan);
+    const auto* plan = std::get_if<BrdfPlan>(&loaded.job.plan);
+    return plan && !plan->accuracy.max_seconds;
 }
 
 BrdfResult dispatch(const LoadedJob& loaded, const JobFolder& job, Executor& executor, RunOptions options,
                     const Monitor& monitor, const std::atomic<bool>* keep_queued) {
+    if (!std::holds_alternative<BrdfPlan>(loaded.job.plan))
+        throw Error(ErrorCode::invalid_input, "/measure/kind", "",
+                    "only brdf jobs are cut into shards: gonio run");
     if (!can_be_dispatched(loaded))
         throw Error(ErrorCode::invalid_input, "/accuracy/max_seconds", "",
                     "cannot be kept by shards on many machines: ask for a target_relative_error");
@@ -160,7 +164,7 @@ BrdfResult dispatch(const LoadedJob& loaded, const JobFolder& job, Executor& exe
     try {
         for (;;) {
             try {
-                BrdfResult result = run_job(loaded, options, merging);
+                BrdfResult result = run_brdf(loaded, options, merging);
                 cancel(executor, job);  // shards that were thought lost, and run twice
                 return result;
             } catch (const MissingShards& missing) {

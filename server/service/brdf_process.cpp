@@ -43,7 +43,7 @@ std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, c
 
 // Here, or shard by shard on other machines: the same bits.
 BrdfResult compute(const LoadedJob& loaded, const std::string& document, const Workplace& place) {
-    if (!place.executor || !can_be_dispatched(loaded)) return run_job(loaded, place.options, place.monitor);
+    if (!place.executor || !can_be_dispatched(loaded)) return run_brdf(loaded, place.options, place.monitor);
     const JobFolder folder(place.shared_folder, loaded, document, "/", place.shard_command, place.options);
     BrdfResult result = dispatch(loaded, folder, *place.executor, place.options, place.monitor, place.ending);
     std::error_code ignored;  // costs room, no correctness
@@ -55,6 +55,7 @@ PreparedJob prepare(json document, std::optional<ReferenceOptions> reference, Ob
     const UploadedFiles files = resolve_uploads(document, objects);
     const std::string text = files.document.dump();
     Job job = parse_job(text, {});
+    require_kind(job, "brdf");
     read_as_untrusted(job);
     const auto loaded = std::make_shared<const LoadedJob>(load_job(job, reference));
     const auto& plan = std::get<BrdfPlan>(loaded->job.plan);

@@ -4,6 +4,7 @@
 
 #include "server/job.h"
 #include "server/json_node.h"
+#include "server/measure_kind.h"
 
 namespace gonio {
 
@@ -11,8 +12,26 @@ using nlohmann::json;
 using nlohmann::ordered_json;
 
 const std::vector<ServiceProcess>& service_processes() {
-    static const std::vector<ServiceProcess> processes = {brdf_process(), reference_process(),
-                                                          statistics_process()};
+    static const std::vector<ServiceProcess> processes = {
+        brdf_process(),
+        reference_process(),
+        statistics_process(),
+        measurement_process(btf_kind(), "Bidirectional texture function of a height field",
+                            "What a camera sees of every place of the base plane, for all lights and views.",
+                            "radiance of every facet and which facet each pixel shows; a picture; the means",
+                            {{"btf", "application/octet-stream"},
+                             {"png", "image/png"},
+                             {"csv", "text/csv"},
+                             {"json", "application/json"}}),
+        measurement_process(light_field_kind(), "Light field of a height field",
+                            "Radiance over position and direction, or over two planes.",
+                            "radiance of every facet and which facet each pixel shows; a picture",
+                            {{"btf", "application/octet-stream"}, {"png", "image/png"}}),
+        measurement_process(maps_kind(), "Light, shadow and sky on a height field",
+                            "Direct, indirect and total light, shadow, masking and sky, one pixel a cell.",
+                            "all layers, and a sheet of them",
+                            {{"exr", "image/x-exr"}, {"png", "image/png"}, {"arrays", "application/octet-stream"}}),
+    };
     return processes;
 }
 

@@ -33,6 +33,16 @@ class Remote(Service):
             self.assertEqual((self.folder / "local" / name).read_bytes(), (self.folder / "remote" / name).read_bytes())
         self.assertEqual((self.folder / "local/a.exr").stat().st_size, (self.folder / "remote/a.exr").stat().st_size)
 
+    def test_run_writes_the_same_pictures(self):
+        lights = {"list_deg": [[30, 0], [60, 90]]}
+        for measure, formats in (({"kind": "btf", "incident": lights, "outgoing": lights}, ("btf", "images", "png", "csv")),
+                                 ({"kind": "maps", "incident": lights}, ("arrays", "png"))):
+            self.write({**JOB, "measure": measure}, [{"format": name, "path": f"a.{name}"} for name in formats])
+            self.gonio("run", "job.json", "-o", "local", "-q")
+            self.gonio("run", "job.json", "-o", "remote", "-q", "--server", self.url)
+            for name in formats:
+                self.assertEqual((self.folder / f"local/a.{name}").read_bytes(), (self.folder / f"remote/a.{name}").read_bytes())
+
     def test_submit_wait_fetch_list(self):
         self.write(MEDIUM, [{"format": "csv", "path": "a.csv"}])
         job = self.gonio("submit", "job.json", "--server", self.url).stdout.strip()

@@ -28,6 +28,7 @@ class Documentation(ServiceTest):
         text = (ROOT / "clients/python/README.md").read_text()
         text = text.replace("http://127.0.0.1:8080", self.service.url).replace('program="gonio"', f"program={GONIO!r}")
         text = text.replace('"lava.csv"', repr(str(self.folder / "lava.csv")))
+        text = text.replace('"results"', repr(str(self.folder / "results")))
         text = text.replace('"lava.png"', repr(str(ROOT / "tests/samples/lava_rock_256_16bit.png")))
         examples = doctest.DocTestParser().get_doctest(text.replace("```", ""), {}, "README.md", None, 0)
         self.assertGreaterEqual(len(examples.examples), 10)

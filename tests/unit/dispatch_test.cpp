@@ -35,7 +35,7 @@ class ScriptedExecutor : public Executor {
         RunOptions options;
         options.checkpoints = &checkpoints;
         options.shard_task = {ShardTask::Kind::compute_one, index};
-        EXPECT_THROW(run_job(loaded_, options), ShardDone);
+        EXPECT_THROW(run_brdf(loaded_, options), ShardDone);
     }
     void fail(int index, int exit_code) const {
         std::ofstream(job_.dispatch() + "/failed-" + std::to_string(index)) << exit_code << "\nno luck\n";
@@ -62,7 +62,7 @@ class DispatchTest : public ExecutorTest {
     }
     Table run() { return dispatch(loaded, job, executor, {}, monitor, keep_queued).table; }
     void expect_the_table() {
-        const Table expected = run_job(loaded, {}).table, table = run();
+        const Table expected = run_brdf(loaded, {}).table, table = run();
         EXPECT_EQ(table.f, expected.f);
         EXPECT_EQ(table.se, expected.se);
         EXPECT_EQ(table.provenance, expected.provenance);

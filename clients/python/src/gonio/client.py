@@ -5,7 +5,7 @@ import hashlib
 import os
 import tempfile
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 from urllib.parse import urlencode
@@ -63,12 +63,12 @@ class Client:
             file.flush()
             return {"sha256": self._upload_file(Path(file.name)), **members}
 
-    def submit(self, job: JobDocument | None = None, /, *, process: str = "brdf", key: str | None = None,
+    def submit(self, job: JobDocument | None = None, /, *, process: str | None = None, key: str | None = None,
                **members: Any) -> Job:
         """Hands in a job: a document (a mapping or the path of a JSON file), members given by name, or both.
 
         A surface given as a file or as an array (`grid`) is uploaded, and so are albedo maps; `output` is left out, for
-        outputs are fetched.
+        outputs are fetched. process: by default that of the kind of measurement.
         However often this has to be tried, it makes one job. key: an Idempotency-Key of one's own: the same again,
         even from another process, is the same job. Raises ApiError with a pointer to what is wrong.
 
@@ -85,6 +85,9 @@ class Client:
                     files |= self.upload(files.pop(name))
                 elif name == "files" and isinstance(value, list):
                     files["sha256"] = [self.upload(path)["sha256"] for path in files.pop(name)]
+        if process is None:
+            measure = document.get("measure")
+            process = str(measure.get("kind", "brdf")) if isinstance(measure, Mapping) else "brdf"
         body = json_body(document_text({"inputs": document}))
         info = self._transport.json("POST", f"processes/{process}/execution", body,
                                     {"Idempotency-Key": key or uuid.uuid4().hex})

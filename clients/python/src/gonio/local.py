@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import tempfile
@@ -35,19 +36,38 @@ def run(job: JobDocument | None = None, /, *, program: str = "gonio", threads: i
     document = read_document(job, members)
     document["output"] = [{"format": "json", "path": "table.json"}]
     with tempfile.TemporaryDirectory(prefix="gonio_") as folder:
-        surface = document.get("surface")
-        if isinstance(surface, dict) and isinstance(surface.get("grid"), np.ndarray):
-            surface["file"] = f"{folder}/grid.npy"
-            with open(surface["file"], "wb") as file:
-                write_array(surface.pop("grid"), file, "/surface/grid")
-        path = Path(folder, "job.json")
-        path.write_text(document_text(document))
-        command = [program, "run", str(path), "-o", folder, "--json"]
-        _execute(command + (["--threads", str(threads)] if threads else []), progress, timeout)
+        _run_document(document, folder, program, threads, progress, timeout)
         return read_table(f"{folder}/table.json")
 
 
-def _execute(command: list[str], progress: Progress, timeout: float | None) -> None:
+def run_files(folder: str | os.PathLike[str], job: JobDocument | None = None, /, *, program: str = "gonio",
+              threads: int | None = None, progress: Progress = False, timeout: float | None = None,
+              **members: Any) -> list[Path]:
+    """Runs a job of any kind by `gonio run` and returns the files of its `output`, below `folder`.
+
+    The other parameters, and what is raised, are those of run. read_arrays reads BTFs, light fields and maps.
+    """
+    document = read_document(job, members)
+    answer = _run_document(document, folder, program, threads, progress, timeout)
+    return [Path(output["path"]) for output in json.loads(answer)["outputs"]]
+
+
+def _run_document(document: dict[str, Any], folder: str | os.PathLike[str], program: str, threads: int | None,
+                  progress: Progress, timeout: float | None) -> str:
+    """What the program prints."""
+    with tempfile.TemporaryDirectory(prefix="gonio_") as inputs:
+        surface = document.get("surface")
+        if isinstance(surface, dict) and isinstance(surface.get("grid"), np.ndarray):
+            surface["file"] = f"{inputs}/grid.npy"
+            with open(surface["file"], "wb") as file:
+                write_array(surface.pop("grid"), file, "/surface/grid")
+        path = Path(inputs, "job.json")
+        path.write_text(document_text(document))
+        command = [program, "run", str(path), "-o", os.fspath(folder), "--json"]
+        return _execute(command + (["--threads", str(threads)] if threads else []), progress, timeout)
+
+
+def _execute(command: list[str], progress: Progress, timeout: float | None) -> str:
     with tempfile.TemporaryFile("w+") as answer:
         try:
             process = subprocess.Popen(command, stdout=answer, stderr=subprocess.PIPE, text=True, errors="replace")
@@ -73,11 +93,11 @@ def _execute(command: list[str], progress: Progress, timeout: float | None) -> N
                     raise
         finally:
             timer.cancel()
+        answer.seek(0)
         if process.returncode == 0:
-            return
+            return answer.read()
         if timed_out.is_set():
             raise TimedOut(f"{timeout} s are over")
-        answer.seek(0)
         raise _failure(process.returncode, answer.read(), last_words)
 
 

@@ -1,0 +1,261 @@
+#include "measure/maps.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "base/error.h"
+#include "directions/gonio_grid.h"
+#include "measure/describe.h"
+#include "measure/facet_light.h"
+
+namespace gonio {
+namespace {
+
+constexpr int fewest_runs = 2, most_runs = 64;
+constexpr int columns_at_once = 4 * column_block;
+
+std::string numbered(const std::string& name, size_t k) {
+    std::string digits = std::to_string(k);
+    return name + std::string(3 - std::min<size_t>(3, digits.size()), '0') + digits;
+}
+
+Accuracy::Samples samples_of(const MapsPlan& plan) {
+    return plan.accuracy.samples.value_or(Accuracy::Samples{4, 64, 1, fewest_runs});
+}
+
+// The mean of independent runs of one layer, and what they say about its error.
+struct LayerSum {
+    MapLayer layer;
+    std::vector<double> sum, squares;
+    bool is_light = false;
+};
+
+class Measurement {
+  public:
+    Measurement(const HeightField& surface, const Material& material, const MapsPlan& plan,
+                const RunOptions& options, const Monitor& monitor)
+        : surface_(surface),
+          channels_(material.channels),
+          plan_(plan),
+          monitor_(monitor),
+          n_cells_(static_cast<size_t>(surface.nx) * surface.ny),
+          started_(std::chrono::steady_clock::now()),
+          light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor) {}
+
+    MapsResult run() {
+        while (wants_more()) {
+            monitor_.report(
+                {static_cast<double>(runs_) / (runs_ + 1), "run " + std::to_string(runs_ + 1), error_});
+            light_.start_run(runs_);
+            next_ = 0;
+            add_lights();
+            add_masks();
+            add_sky();
+            ++runs_;
+            if (runs_ >= fewest_runs) estimate_errors();
+        }
+        MapsResult result;
+        result.maps.nx = surface_.nx;
+        result.maps.ny = surface_.ny;
+        for (LayerSum& sum : layers_) {
+            for (const double s : sum.sum) sum.layer.pixels.push_back(static_cast<float>(s / runs_));
+            result.maps.layers.push_back(std::move(sum.layer));
+        }
+        light_.describe(runs_, result.report);
+        result.report.relative_error = error_;
+        result.report.target_met =
+            plan_.accuracy.samples || plan_.accuracy.target() == 0 || error_ <= plan_.accuracy.target();
+        result.report.seconds = {{"wall", seconds()}};
+        return result;
+    }
+
+  private:
+    double seconds() const {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
+    }
+    bool wants_more() const {
+        if (runs_ < fewest_runs) return true;
+        if (plan_.accuracy.samples) return runs_ < plan_.accuracy.samples->replicates;
+        if (plan_.accuracy.max_seconds && seconds() * (runs_ + 1) / runs_ > *plan_.accuracy.max_seconds)
+            return false;
+        return error_ > plan_.accuracy.target() && runs_ < most_runs;
+    }
+
+    // Adds one run of the next layer: value(unknown) of every facet part, averaged over a cell.
+    template <class Value>
+    void add(const std::string& name, bool is_light, Value&& value) {
+        if (next_ == layers_.size()) {
+            layers_.emplace_back();
+            layers_.back().layer.name = name;
+            layers_.back().is_light = is_light;
+            layers_.back().sum.assign(n_cells_, 0.0);
+            layers_.back().squares.assign(n_cells_, 0.0);
+        }
+        LayerSum& layer = layers_[next_++];
+        const size_t n_facets = light_.tile().n_parts() * 2 * n_cells_;
+        std::vector<double> cells(n_cells_, 0.0);
+        for (size_t facet = 0; facet < n_facets; ++facet)
+            cells[facet % n_cells_] += value(light_.unknown_of(facet));
+        const double share = static_cast<double>(n_cells_) / static_cast<double>(n_facets);
+        for (size_t k = 0; k < n_cells_; ++k) {
+            layer.sum[k] += share * cells[k];
+            layer.squares[k] += share * cells[k] * share * cells[k];
+        }
+    }
+
+    // field(unknown, column) over sqrt(area), in units of the base plane's irradiance.
+    static const float* column_of(const Fields& fields, int column) {
+        return fields.block(column / column_block) + column % column_block;
+    }
+
+    void add_lights() {
+        for (size_t first = 0; first < plan_.incident.size(); first += columns_at_once) {
+            const std::vector<Vec3> lights = vectors(plan_.incident, first);
+            const LightIrradiance direct = light_.irradiance(lights);
+            const Radiosity all = light_.radiosity(direct.lights);
+            // The first order alone: the albedo once, no operator.
+            for (size_t l = 0; l < lights.size(); ++l) {
+                const std::string name = numbered("light", first + l);
+                const int column = static_cast<int>(l);
+                const float* lit = column_of(direct.lights, column);
+                const double unit = 1 / lights[l].z;
+                for (int c = 0; c < light_.n_channels(); ++c) {
+                    const float* total = column_of(all.of_channel[c], column);
+                    const auto direct_of = [&](size_t u) {
+                        return light_.albedo_of(c, u) * lit[u * column_block] * unit / light_.sqrt_area(u);
+                    };
+                    const auto total_of = [&](size_t u) {
+                        return total[u * column_block] * unit / light_.sqrt_area(u);
+                    };
+                    add(name + ".direct." + channels_[c], true, direct_of);
+                    add(name + ".indirect." + channels_[c], true,
+                        [&](size_t u) { return std::max(0.0, total_of(u) - direct_of(u)); });
+                    add(name + ".total." + channels_[c], true, total_of);
+                }
+                add_share(name + ".shadow", lights[l], lit);
+            }
+        }
+    }
+
+    void add_masks() {
+        for (size_t first = 0; first < plan_.outgoing.size(); first += columns_at_once) {
+            const std::vector<Vec3> views = vectors(plan_.outgoing, first);
+            const LightIrradiance seen = light_.irradiance(views);
+            for (size_t v = 0; v < views.size(); ++v)
+                add_share(numbered("view", first + v) + ".mask", views[v],
+                          column_of(seen.lights, static_cast<int>(v)));
+        }
+    }
+
+    // Visible share of a part: its irradiance factor over the unoccluded one.
+    void add_share(const std::string& name, const Vec3& d, const float* factor) {
+        const Tile& tile = light_.tile();
+        add(name, false, [&](size_t u) {
+            const size_t slot = u % tile.n_slots();
+            const double cosine =
+                tile.normal_x[slot] * d.x + tile.normal_y[slot] * d.y + tile.normal_z[slot] * d.z;
+            return cosine > 1e-6 ? std::min(1.0, factor[u * column_block] / (tile.sqrt_area[slot] * cosine))
+                                 : 0.0;
+        });
+    }
+
+    // Directions of equal projected solid angle over the base plane, pi / n each: their solid angle is that
+    // over d.z.
+    void add_sky() {
+        if (plan_.sky_directions == 0) return;
+        std::vector<double> sky(light_.tile().n_unknowns(), 0.0);
+        std::vector<AnglesDeg> set = equal_projected_hemisphere(plan_.sky_directions);
+        // Turned from run to run by the golden angle, so that the runs tell what the choice of directions
+        // does.
+        for (AnglesDeg& direction : set) direction.phi_deg += 222.4922359 * runs_;
+        for (size_t first = 0; first < set.size(); first += columns_at_once) {
+            const std::vector<Vec3> directions = vectors(set, first);
+            const LightIrradiance seen = light_.irradiance(directions);
+            for (size_t d = 0; d < directions.size(); ++d) {
+                const float* factor = column_of(seen.lights, static_cast<int>(d));
+                const double weight = 1 / (static_cast<double>(set.size()) * directions[d].z);
+                for (size_t u = 0; u < sky.size(); ++u) sky[u] += weight * factor[u * column_block];
+            }
+        }
+        add("sky", false, [&](size_t u) { return sky[u] / light_.sqrt_area(u); });
+    }
+
+    static std::vector<Vec3> vectors(const std::vector<AnglesDeg>& angles, size_t first) {
+        std::vector<Vec3> list;
+        for (size_t k = first; k < std::min(angles.size(), first + columns_at_once); ++k)
+            list.push_back(to_vector(angles[k]));
+        return list;
+    }
+
+    void estimate_errors() {
+        error_ = 0;
+        for (LayerSum& sum : layers_) {
+            double mean = 0, variance = 0;
+            for (size_t k = 0; k < n_cells_; ++k) {
+                mean += sum.sum[k] / runs_;
+                variance += std::max(0.0, sum.squares[k] - sum.sum[k] * sum.sum[k] / runs_) / (runs_ - 1);
+            }
+            const double n = static_cast<double>(n_cells_);
+            sum.layer.mean = mean / n;
+            sum.layer.se = std::sqrt(variance / n / runs_);
+            if (sum.is_light && sum.layer.name.find(".total.") != std::string::npos && sum.layer.mean > 0)
+                error_ = std::max(error_, sum.layer.se / sum.layer.mean);
+        }
+    }
+
+    const HeightField& surface_;
+    const std::vector<std::string>& channels_;
+    const MapsPlan& plan_;
+    const Monitor& monitor_;
+    size_t n_cells_;
+    std::chrono::steady_clock::time_point started_;
+    FacetLight light_;
+    std::vector<LayerSum> layers_;
+    size_t next_ = 0;
+    int runs_ = 0;
+    double error_ = 0;
+};
+
+double layers_of(const Material& material, const MapsPlan& plan) {
+    return static_cast<double>(plan.incident.size()) *
+               (3.0 * static_cast<double>(material.channels.size()) + 1) +
+           static_cast<double>(plan.outgoing.size()) + (plan.sky_directions > 0);
+}
+
+double memory_of(const HeightField& surface, const Material& material, const MapsPlan& plan) {
+    const double cells = static_cast<double>(surface.nx) * surface.ny;
+    const Accuracy::Samples samples = samples_of(plan);
+    const double unknowns = 2 * cells * samples.refinement * samples.refinement;
+    return 100 * cells + 20 * cells * layers_of(material, plan) +
+           4 * unknowns * columns_at_once * (6 + static_cast<double>(material.channels.size())) +
+           2 * cells * samples.directions * 0.35 * sizeof(Link);
+}
+
+}  // namespace
+
+MapsResult measure_maps(const HeightField& surface, const Material& material, const MapsPlan& plan,
+                        const RunOptions& options, const Monitor& monitor) {
+    if (const double bytes = memory_of(surface, material, plan);
+        bytes > static_cast<double>(options.max_bytes))
+        throw Error(ErrorCode::limit, "/measure", number(bytes / 1e9) + " GB",
+                    "more than the " + number(static_cast<double>(options.max_bytes) / 1e9) +
+                        " GB of working memory: crop or resample the surface, or ask for fewer lights");
+    return Measurement(surface, material, plan, options, monitor).run();
+}
+
+Prediction predict_maps(const HeightField& surface, const Material& material, const MapsPlan& plan) {
+    const double cells = static_cast<double>(surface.nx) * surface.ny;
+    const Accuracy::Samples samples = samples_of(plan);
+    const double rays =
+        static_cast<double>(plan.incident.size() + plan.outgoing.size()) + plan.sky_directions;
+    Prediction prediction;
+    prediction.cpu_seconds =
+        0.05 + samples.replicates * 2 * cells * samples.refinement * samples.refinement *
+                   (1e-6 + 15e-9 * samples.directions + 25e-9 * rays * samples.sub_samples);
+    prediction.memory_bytes = (64 << 20) + memory_of(surface, material, plan);
+    prediction.table_bytes = 4 * cells * layers_of(material, plan);
+    return prediction;
+}
+
+}  // namespace gonio

@@ -1,0 +1,35 @@
+// BTFs as files (array_file.h), in two forms of one content.
+//
+// factored: "facet_radiance" [channel][light][facet] halves and "view_maps" [view][sample][row][column], the
+// facet that each place of a pixel shows. 20 times smaller than the images, and nothing is lost. images:
+// "images" [view][light][channel][row][column], halves: each the value of its facet, or the mean of its
+// samples in float.
+//
+// Both begin with "mean", "mean_se", "mean_bias" [channel][light][view] and "pixel_se" [channel][light],
+// floats in 1/sr (core/measure/btf.h). expand_btf makes the second from the first, to the last bit what
+// `images` of the same job would be.
+#pragma once
+#include <string>
+
+#include "base/monitor.h"
+#include "measure/btf.h"
+#include "server/run_job.h"
+
+namespace gonio {
+
+// What a job of kind btf or light_field asks for.
+const BtfPlan& pictures_of(const LoadedJob& job);
+
+void write_factored_btf(const LoadedJob& job, const Btf& btf, const std::string& path);
+// Streamed, the images of one view at a time.
+void write_btf_images(const LoadedJob& job, const Btf& btf, const std::string& path, const Monitor& monitor);
+
+// A factored file, read and checked. Throws Error for anything else.
+struct StoredBtf {
+    std::string head;  // its first line without "arrays"
+    Btf btf;           // without what `mean` says about directions and provenance
+};
+StoredBtf read_factored_btf(const std::string& path);
+void expand_btf(const std::string& factored, const std::string& images, const Monitor& monitor);
+
+}  // namespace gonio

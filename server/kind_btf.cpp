@@ -1,0 +1,174 @@
+// "measure": {"kind": "btf", ...} and {"kind": "light_field", ...}
+#include <algorithm>
+
+#include "base/half.h"
+#include "server/btf_file.h"
+#include "server/canonical.h"
+#include "server/job_sections.h"
+#include "server/measure_kind.h"
+#include "table/io/image_io.h"
+#include "table/io/table_io.h"
+
+namespace gonio {
+namespace {
+
+constexpr uint64_t max_pixels = 16384, max_pixel_samples = 256, max_cameras = 1024;
+
+// What both kinds have in common.
+void parse_pictures(const JsonNode& measure, const Accuracy& accuracy, BtfPlan& plan) {
+    plan.incident = parse_directions(measure.at("incident"));
+    if (const auto pixels = measure.find("pixels")) {
+        if (pixels->array_size() != 2) pixels->refuse("must be [columns, rows], two whole numbers");
+        plan.pixels_x = static_cast<int>(pixels->element(0).whole_number(1, max_pixels));
+        plan.pixels_y = static_cast<int>(pixels->element(1).whole_number(1, max_pixels));
+    }
+    if (const auto samples = measure.find("pixel_samples"))
+        plan.pixel_samples = static_cast<int>(samples->whole_number(1, max_pixel_samples));
+    if (const auto plane = measure.find("plane"))
+        plan.plane = plane->choice({"top", "zero"}) == "top" ? BtfPlan::Plane::top : BtfPlan::Plane::zero;
+    plan.max_order = parse_max_order(measure);
+    plan.accuracy = accuracy;
+}
+
+BtfPlan parse_btf(const JsonNode& measure, const Accuracy& accuracy) {
+    measure.allow_keys({"kind", "incident", "outgoing", "pixels", "pixel_samples", "plane", "max_order"});
+    BtfPlan plan;
+    plan.outgoing = parse_directions(measure.at("outgoing"));
+    parse_pictures(measure, accuracy, plan);
+    return plan;
+}
+
+CameraPlane parse_cameras(const JsonNode& node) {
+    node.allow_keys({"count", "width", "depth", "height"});
+    const JsonNode count = node.at("count");
+    if (count.array_size() != 2) count.refuse("must be [columns, rows], two whole numbers");
+    CameraPlane cameras;
+    cameras.n_u = static_cast<int>(count.element(0).whole_number(1, max_cameras));
+    cameras.n_v = static_cast<int>(count.element(1).whole_number(1, max_cameras));
+    cameras.width = node.at("width").positive_length();
+    cameras.depth = node.has("depth") ? node.at("depth").positive_length() : cameras.width;
+    cameras.height = node.at("height").positive_length();
+    return cameras;
+}
+
+LightFieldPlan parse_light_field(const JsonNode& measure, const Accuracy& accuracy) {
+    measure.allow_keys(
+        {"kind", "incident", "outgoing", "cameras", "pixels", "pixel_samples", "plane", "max_order"});
+    LightFieldPlan plan;
+    if (const auto cameras = measure.find("cameras")) {
+        if (const auto outgoing = measure.find("outgoing"))
+            outgoing->refuse(
+                "a light field has directions or cameras: leave one of \"outgoing\" and \"cameras\" out");
+        plan.cameras = parse_cameras(*cameras);
+    } else {
+        plan.outgoing = parse_directions(measure.at("outgoing"));
+    }
+    parse_pictures(measure, accuracy, plan);
+    return plan;
+}
+
+nlohmann::json canonical_plan(const BtfPlan& plan, const char* kind) {
+    nlohmann::json j{
+        {"kind", kind},
+        {"incident", canonical(plan.incident)},
+        {"pixel_samples", plan.pixel_samples},
+        {"plane", plan.plane == BtfPlan::Plane::top ? "top" : "zero"},
+        {"max_order", plan.max_order == 0 ? nlohmann::json("all") : nlohmann::json(plan.max_order)},
+        {"accuracy", canonical(plan.accuracy)}};
+    if (plan.cameras) {
+        const CameraPlane& c = *plan.cameras;
+        j["cameras"] = {
+            {"count", {c.n_u, c.n_v}}, {"width_m", c.width}, {"depth_m", c.depth}, {"height_m", c.height}};
+    } else {
+        j["outgoing"] = canonical(plan.outgoing);
+    }
+    if (plan.pixels_x > 0) j["pixels"] = {plan.pixels_x, plan.pixels_y};
+    return j;
+}
+
+Prediction predict(const LoadedJob& job) {
+    return predict_btf(job.surface.surface, job.material, pictures_of(job));
+}
+
+size_t nearest(const std::vector<AnglesDeg>& directions, const AnglesDeg& wanted) {
+    const Vec3 w = to_vector(wanted);
+    const auto towards = [&](const AnglesDeg& a) { return dot(to_vector(a), w); };
+    return std::max_element(directions.begin(), directions.end(),
+                            [&](const AnglesDeg& a, const AnglesDeg& b) { return towards(a) < towards(b); }) -
+           directions.begin();
+}
+
+// For looking: from the view nearest the normal, under the light nearest 45 degrees from the upper left;
+// white is a white plane.
+void write_preview(const LoadedJob& job, const Btf& btf, const std::string& path) {
+    const BtfPlan& plan = pictures_of(job);
+    const BtfShape& shape = btf.shape;
+    const size_t view = nearest(btf.mean.outgoing, {0, 0}), light = nearest(plan.incident, {45, 135});
+    std::vector<uint16_t> images(shape.images_size() / shape.n_views);
+    expand_view(shape, btf.radiance, btf.view_maps, static_cast<int>(view), images);
+    PngChannels picture;
+    picture.width = shape.pixels_x;
+    picture.height = shape.pixels_y;
+    picture.scale = pi;
+    picture.attributes = job_provenance(job);
+    std::vector<std::vector<float>> channels(shape.n_channels == 3 ? 3 : 1);
+    for (size_t c = 0; c < channels.size(); ++c) {
+        const size_t channel = channels.size() == 3 ? c : shape.n_channels / 2;
+        const uint16_t* image = &images[(light * shape.n_channels + channel) * shape.n_pixels()];
+        for (size_t p = 0; p < shape.n_pixels(); ++p) channels[c].push_back(from_half_bits(image[p]));
+    }
+    for (const auto& channel : channels) picture.channels.push_back(channel.data());
+    write_png_picture(picture, path);
+}
+
+Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
+           const Monitor& monitor) {
+    BtfResult result = measure_btf(job.surface.surface, job.material, pictures_of(job), options, monitor);
+    Table& mean = result.btf.mean;
+    mean.provenance = result.report.settings;
+    for (const OutputRequest& file : files) {
+        monitor.check_cancelled();
+        if (file.format == "btf") {
+            write_factored_btf(job, result.btf, file.path);
+        } else if (file.format == "images") {
+            write_btf_images(job, result.btf, file.path, monitor);
+        } else if (file.format == "png") {
+            write_preview(job, result.btf, file.path);
+        } else {
+            Table table = mean;
+            const auto origin = job_provenance(job);
+            table.provenance.insert(table.provenance.begin(), origin.begin(), origin.end());
+            write_table(table, file.format, file.path);
+        }
+    }
+    return std::move(result.report);
+}
+
+}  // namespace
+
+MeasureKind btf_kind() {
+    return {"btf",
+            "btf",
+            {"btf", "images", "png", "csv", "json"},
+            [](const JsonNode& measure, const Accuracy& accuracy) -> MeasurePlan {
+                return parse_btf(measure, accuracy);
+            },
+            [](const MeasurePlan& plan) { return canonical_plan(std::get<BtfPlan>(plan), "btf"); },
+            predict,
+            run};
+}
+
+MeasureKind light_field_kind() {
+    return {
+        "light_field",
+        "light_field",
+        {"btf", "images", "png"},
+        [](const JsonNode& measure, const Accuracy& accuracy) -> MeasurePlan {
+            return parse_light_field(measure, accuracy);
+        },
+        [](const MeasurePlan& plan) { return canonical_plan(std::get<LightFieldPlan>(plan), "light_field"); },
+        predict,
+        run};
+}
+
+}  // namespace gonio

@@ -1,0 +1,46 @@
+"""BTFs, light fields and maps: the same from a server and from the program, read as arrays."""
+import gonio
+import numpy as np
+from support import GONIO, MATERIAL, SURFACE, ServiceTest
+
+LIGHTS = {"list_deg": [[30, 0], [60, 90]]}
+BTF = {"surface": SURFACE, "material": MATERIAL, "measure": {"kind": "btf", "incident": LIGHTS, "outgoing": {"bonn": 81}},
+       "accuracy": {"samples": {"directions": 16, "replicates": 2}}}
+
+
+class Files(ServiceTest):
+    def test_a_btf_from_both_sides(self):
+        client = gonio.Client(self.service.url)
+        job = client.submit(BTF).wait(120)
+        self.assertEqual(job.last.info["processID"], "btf")
+        factored = gonio.read_arrays(job.fetch(self.folder / "a.btf", "btf"))
+        self.assertTrue(job.read("btf", "png").startswith(b"\x89PNG"))
+        paths = gonio.run_files(self.folder, BTF, program=GONIO,
+                                output=[{"format": "images", "path": "b.images"}, {"format": "btf", "path": "b.btf"}])
+        images = gonio.read_arrays(paths[0])
+        self.assertEqual(images["images"].shape, (81, 2, 1, 1, 16))
+        self.assertEqual(images.head["job_hash"], factored.head["job_hash"])
+        for view in (0, 40, 80):
+            np.testing.assert_array_equal(factored.images(view), images.images(view))
+        self.assertEqual((self.folder / "a.btf").read_bytes(), paths[1].read_bytes())
+
+    def test_maps_and_light_fields_of_a_server(self):
+        client = gonio.Client(self.service.url)
+        maps = client.submit(BTF, measure={"kind": "maps", "incident": LIGHTS}).wait(120)
+        arrays = gonio.read_arrays(maps.fetch(self.folder / "a.arrays", "maps"))
+        self.assertEqual(arrays["maps"].shape, (len(arrays.head["layers"]), 1, 16))
+        field = client.submit(BTF, measure={"kind": "light_field", "incident": LIGHTS,
+                                            "cameras": {"count": [3, 2], "width": "1 mm", "height": "5 mm"}}).wait(120)
+        self.assertEqual(gonio.read_arrays(field.fetch(self.folder / "f.btf", "light_field")).images(5).shape, (2, 1, 1, 16))
+
+    def test_a_process_takes_its_own_kind(self):
+        with self.assertRaises(gonio.ApiError) as caught:
+            gonio.Client(self.service.url).submit(BTF, process="brdf")
+        self.assertIn("/measure/kind", str(caught.exception))
+
+    def test_what_is_no_such_file(self):
+        for name, content in (("empty", b""), ("table", b"theta_i_deg,phi"), ("json", b"{}\n"), ("list", b"[1]\n"),
+                              ("beyond", b'{"arrays": [{"name": "a", "dtype": "<f4", "shape": [9], "offset": 64}]}\n')):
+            (self.folder / name).write_bytes(content)
+            with self.subTest(name), self.assertRaises(gonio.InvalidTable):
+                gonio.read_arrays(self.folder / name)
