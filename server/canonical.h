@@ -8,6 +8,7 @@ namespace gonio {
 
 nlohmann::json canonical(const std::vector<AnglesDeg>& directions);
 nlohmann::json canonical(const Accuracy& accuracy);
+nlohmann::json canonical(const ProjectionPlan& plan);
 nlohmann::json canonical(const BrdfPlan& plan);
 
 }  // namespace gonio

@@ -30,6 +30,17 @@ json canonical(const Accuracy& accuracy) {
     return j;
 }
 
+json canonical(const ProjectionPlan& plan) {
+    using Form = ProjectionPlan::Form;
+    json j{{"basis", plan.basis == ProjectionPlan::Basis::sh ? "sh" : "hsh"},
+           {"order", plan.order},
+           {"weighting", plan.weighting == ProjectionPlan::Weighting::cosine ? "cosine" : "none"},
+           {"form", plan.form == Form::per_light ? "per_light" : plan.form == Form::matrix ? "matrix" : "joint"}};
+    if (plan.samples > 0) j["samples"] = plan.samples;
+    if (plan.form == Form::joint) j["isotropic"] = plan.isotropic;
+    return j;
+}
+
 json canonical(const BrdfPlan& plan) {
     json j{{"kind", "brdf"},
            {"incident", canonical(plan.incident)},
@@ -41,6 +52,7 @@ json canonical(const BrdfPlan& plan) {
     if (plan.transport != TransportKind::automatic) j["transport"] = static_cast<int>(plan.transport);
     for (const ReceiverCell& c : plan.outgoing_cells)
         j["cells"].push_back({c.theta_min_deg, c.theta_max_deg, c.phi_min_deg, c.phi_max_deg});
+    if (plan.project) j["project"] = canonical(*plan.project);
     return j;
 }
 

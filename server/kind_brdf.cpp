@@ -15,10 +15,10 @@ Prediction predict(const LoadedJob& job) {
 
 Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
            const Monitor& monitor) {
-    const BrdfResult result = run_brdf(job, options, monitor);
+    BrdfResult result = run_brdf(job, options, monitor);
     monitor.check_cancelled();
-    write_outputs(result.table, files);
-    return result.report;
+    write_outputs(job, result, files);
+    return std::move(result.report);
 }
 
 }  // namespace

@@ -36,6 +36,13 @@ struct MeasureKind {
 const std::vector<MeasureKind>& measure_kinds();
 const MeasureKind& kind_of(const MeasurePlan& plan);
 
+// What a job of this plan gives: its kind's product, or the projection of a table.
+struct Product {
+    std::string name;                  // of the output of its process of the service
+    std::vector<std::string> formats;  // as in MeasureKind
+};
+Product product_of(const MeasurePlan& plan);
+
 // One file each.
 MeasureKind brdf_kind();  // kind_brdf.cpp
 MeasureKind btf_kind();

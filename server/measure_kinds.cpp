@@ -1,4 +1,5 @@
 #include "server/measure_kind.h"
+#include "server/projection_file.h"
 
 namespace gonio {
 
@@ -9,6 +10,12 @@ const std::vector<MeasureKind>& measure_kinds() {
 
 const MeasureKind& kind_of(const MeasurePlan& plan) {
     return measure_kinds().at(plan.index());
+}
+
+Product product_of(const MeasurePlan& plan) {
+    const auto* brdf = std::get_if<BrdfPlan>(&plan);
+    if (brdf && brdf->project) return {"projection", projection_formats()};
+    return {kind_of(plan).output, kind_of(plan).formats};
 }
 
 }  // namespace gonio

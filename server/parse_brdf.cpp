@@ -28,9 +28,14 @@ int parse_max_order(const JsonNode& measure) {
 }
 
 BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
-    measure.allow_keys({"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders", "transport"});
+    measure.allow_keys(
+        {"kind", "incident", "outgoing", "pairs_deg", "max_order", "orders", "transport", "project"});
     BrdfPlan plan;
-    parse_direction_pairs(measure, plan);
+    plan.accuracy = accuracy;
+    if (measure.has("project"))
+        parse_projection(measure, plan);
+    else
+        parse_direction_pairs(measure, plan);
     if (const size_t rows = plan.incident.size() * plan.outgoing.size();
         plan.pairs.empty() && rows > max_rows) {
         throw Error(ErrorCode::limit, measure.path(), std::to_string(rows) + " pairs of directions",
@@ -40,7 +45,6 @@ BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy) {
     if (const auto orders = measure.find("orders"))
         plan.separate_orders = orders->choice({"sum", "separate"}) == "separate";
     if (const auto transport = measure.find("transport")) plan.transport = parse_transport(*transport);
-    plan.accuracy = accuracy;
     return plan;
 }
 

@@ -15,14 +15,14 @@ const MeasureKind& parse_kind(const JsonNode& measure) {
     return measure_kinds()[std::find(names.begin(), names.end(), name) - names.begin()];
 }
 
-std::vector<OutputRequest> parse_outputs(const std::optional<JsonNode>& node, const MeasureKind& kind,
+std::vector<OutputRequest> parse_outputs(const std::optional<JsonNode>& node, const Product& product,
                                          const std::string& job_name) {
-    if (!node) return {{kind.formats[0], job_name + "." + kind.formats[0]}};
+    if (!node) return {{product.formats[0], job_name + "." + product.formats[0]}};
     std::vector<OutputRequest> outputs(node->array_size());
     for (size_t i = 0; i < outputs.size(); ++i) {
         const JsonNode entry = node->element(i);
         entry.allow_keys({"format", "path"});
-        outputs[i].format = entry.at("format").choice(kind.formats);
+        outputs[i].format = entry.at("format").choice(product.formats);
         const std::optional<JsonNode> path = entry.find("path");
         outputs[i].path = path ? path->text() : job_name + "." + outputs[i].format;
         for (size_t earlier = 0; earlier < i; ++earlier) {
@@ -48,10 +48,10 @@ Job parse_job(std::string_view text, const JobOrigin& origin) {
     SurfaceSource surface = parse_surface(root.at("surface"), origin.folder);
     MaterialSource material = parse_material(root.at("material"), origin.folder);
     const JsonNode measure = root.at("measure");
-    const MeasureKind& kind = parse_kind(measure);
-    return {std::move(surface), std::move(material),
-            kind.parse(measure, parse_accuracy(root.find("accuracy"))),
-            parse_outputs(root.find("output"), kind, origin.name), parse_base(root.find("base"))};
+    MeasurePlan plan = parse_kind(measure).parse(measure, parse_accuracy(root.find("accuracy")));
+    std::vector<OutputRequest> outputs = parse_outputs(root.find("output"), product_of(plan), origin.name);
+    return {std::move(surface), std::move(material), std::move(plan), std::move(outputs),
+            parse_base(root.find("base"))};
 }
 
 SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin) {

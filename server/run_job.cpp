@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "server/job_hash.h"
 #include "server/measure_kind.h"
+#include "server/projection_file.h"
 #include "table/io/table_io.h"
 
 namespace gonio {
@@ -93,10 +94,14 @@ std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::stri
     return files;
 }
 
-void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs) {
-    for (const OutputRequest& output : outputs) {
-        make_folder_of(output.path);
-        write_table(table, output.format, output.path);
+void write_outputs(const LoadedJob& loaded, BrdfResult& result, const std::vector<OutputRequest>& outputs) {
+    for (const OutputRequest& output : outputs) make_folder_of(output.path);
+    if (const auto& plan = std::get<BrdfPlan>(loaded.job.plan); plan.project) {
+        const HarmonicProjection projection = project(result.table, *plan.project);
+        add_to_report(projection, result.report);
+        for (const OutputRequest& output : outputs) write_projection(projection, output.format, output.path);
+    } else {
+        for (const OutputRequest& output : outputs) write_table(result.table, output.format, output.path);
     }
 }
 

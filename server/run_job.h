@@ -39,8 +39,9 @@ std::vector<std::pair<std::string, std::string>> job_provenance(const LoadedJob&
 // Where the outputs of a job go under `folder`; a reference writes "lava.reference.csv" for "lava.csv".
 std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::string& folder);
 
-// Writes every output of a table; missing folders are made.
-void write_outputs(const Table& table, const std::vector<OutputRequest>& outputs);
+// Writes every output of a job of kind brdf, its table or what the table is projected to; missing folders are
+// made. The report then says how well the projection fits.
+void write_outputs(const LoadedJob& loaded, BrdfResult& result, const std::vector<OutputRequest>& outputs);
 
 // Whether `path` is a result of this very job: its head carries the hash. Files are renamed into place whole,
 // so a head that is there stands for the whole file; and 64 hex digits do not appear by chance, so that no

@@ -26,6 +26,7 @@ void add_dispatch(CLI::App& app, CommonOptions& common, Action& action);
 void add_serve(CLI::App& app, CommonOptions& common, Action& action);
 void add_remote_commands(CLI::App& app, CommonOptions& common, Action& action);
 void add_store(CLI::App& app, CommonOptions& common, Action& action);
+void add_project(CLI::App& app, CommonOptions& common, Action& action);
 void add_plot(CLI::App& app, CommonOptions& common, Action& action);
 void add_ndf(CLI::App& app, CommonOptions& common, Action& action);
 void add_schema(CLI::App& app, Action& action);

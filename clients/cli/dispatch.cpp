@@ -32,9 +32,9 @@ int run_dispatch(const DispatchedJob& dispatched, const CommonOptions& common) {
             common.checkpoints, loaded, text, origin.folder,
             {dispatched.program.empty() ? this_program() : dispatched.program, dispatched.options.threads},
             options);
-        const BrdfResult result = dispatch(loaded, folder, *executor, options, monitor);
+        BrdfResult result = dispatch(loaded, folder, *executor, options, monitor);
         monitor.check_cancelled();
-        write_outputs(result.table, outputs);
+        write_outputs(loaded, result, outputs);
         return result.report;
     };
     const std::vector<OutputRequest> files = output_files(loaded, common.folder);

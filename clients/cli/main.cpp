@@ -77,6 +77,7 @@ int main(int argc, char** argv) {
     gonio::add_decode_untrusted(app, action);
     gonio::add_remote_commands(app, common, action);
     gonio::add_store(app, common, action);
+    gonio::add_project(app, common, action);
     gonio::add_plot(app, common, action);
     gonio::add_ndf(app, common, action);
     gonio::add_schema(app, action);

@@ -86,7 +86,7 @@ int execute_remotely(const std::string& path, const RemoteOptions& remote, const
     for (const OutputRequest& output : submitted.job.outputs) {
         const std::filesystem::path file = std::filesystem::path(common.folder) / output.path;
         if (file.has_parent_path()) std::filesystem::create_directories(file.parent_path());
-        const std::string& product = kind_of(submitted.job.plan).output;
+        const std::string product = product_of(submitted.job.plan).name;
         const auto fetch_to = [&](const std::string& target, const std::string& format) {
             write_file_atomically(target,
                                   [&](std::ostream& out) { service.fetch(id, product, format, out); });

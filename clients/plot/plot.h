@@ -10,6 +10,8 @@
 
 namespace gonio {
 
+struct HarmonicProjection;
+
 struct PlotOptions {
     std::string title;       // empty: the surface's name from the provenance
     int incident = -1;       // index of the incident direction of the map; -1: the one nearest to 45 degrees
@@ -24,6 +26,10 @@ void plot_table(const Table& table, const std::string& path, const PlotOptions& 
 
 // D in the planes of the fitted axes, measured and fitted, on a logarithmic axis.
 void plot_ndf(const NdfResult& ndf, const std::string& path, const std::string& title = {});
+
+// Measured lobes (those of the table that lie in the plane of incidence) and what a projection of it makes of them, of up to three
+// incident directions of the table and its middle channel.
+void plot_projection(const Table& table, const HarmonicProjection& projection, const std::string& path);
 
 struct PlotSeries {
     std::string name;

@@ -18,16 +18,22 @@ using nlohmann::json;
 constexpr OutputFormat table_outputs[] = {
     {"csv", "text/csv"}, {"json", "application/json"}, {"exr", "image/x-exr"}};
 
+constexpr OutputFormat projection_outputs[] = {
+    {"csv", "text/csv"}, {"json", "application/json"}, {"npy", "application/octet-stream"}};
+
 std::vector<ProcessOutput> brdf_outputs() {
     return {
         {"table", "values, standard errors and biases", {std::begin(table_outputs), std::end(table_outputs)}},
+        {"projection",
+         "coefficients of spherical harmonics, of jobs whose measure has a member project",
+         {std::begin(projection_outputs), std::end(projection_outputs)}},
         {"report",
          "what was chosen, skipped, counted, and how long it took",
          {{"json", "application/json"}}}};
 }
 
-// The table in every format, and the report.
-std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, const BrdfResult& result) {
+// The table in every format, its projection if the job asks for one, and the report.
+std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, BrdfResult& result) {
     std::vector<NewOutput> outputs;
     const TemporaryFolder folder;
     for (const OutputFormat& format : table_outputs) {
@@ -35,6 +41,16 @@ std::vector<NewOutput> make_outputs(Objects& objects, const LoadedJob& loaded, c
                           path = (folder.path() / name).string();
         write_table(result.table, format.suffix, path);
         outputs.push_back({name, format.media_type, objects.put_file(path)});
+    }
+    if (std::get<BrdfPlan>(loaded.job.plan).project) {
+        std::vector<OutputRequest> files;
+        for (const OutputFormat& format : projection_outputs)
+            files.push_back(
+                {format.suffix, (folder.path() / (std::string("projection.") + format.suffix)).string()});
+        write_outputs(loaded, result, files);
+        for (size_t k = 0; k < files.size(); ++k)
+            outputs.push_back({"projection." + files[k].format, projection_outputs[k].media_type,
+                               objects.put_file(files[k].path)});
     }
     outputs.push_back(
         {"report.json", "application/json", objects.put(result_json(loaded, result.report, {}, {}))});
@@ -75,7 +91,7 @@ PreparedJob prepare(json document, std::optional<ReferenceOptions> reference, Ob
         };
     }
     prepared.run = [loaded, text](const Workplace& place) {
-        const BrdfResult result = compute(*loaded, text, place);
+        BrdfResult result = compute(*loaded, text, place);
         place.monitor.check_cancelled();
         return make_outputs(place.objects, *loaded, result);
     };

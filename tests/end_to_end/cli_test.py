@@ -18,7 +18,7 @@ import unittest
 GONIO = os.path.abspath(sys.argv.pop(1))
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
 LAVA = str(SOURCE / "tests/samples/lava_rock_256_16bit.png")
-COMMANDS = ["measure", "run", "batch", "expand", "info", "reference", "shard", "merge", "dispatch", "plot", "ndf", "schema", "serve",
+COMMANDS = ["measure", "run", "batch", "expand", "info", "reference", "shard", "merge", "dispatch", "project", "plot", "ndf", "schema", "serve",
             "submit", "status", "wait", "fetch", "cancel", "list", "store", "completions"]
 
 # A flat plane is answered exactly and at once; a V-groove needs the engine.

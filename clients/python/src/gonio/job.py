@@ -15,6 +15,7 @@ from .errors import ApiError, ChecksumError, JobDismissed, JobFailed, Refused, U
 from .events import parse_events
 from .status import Progress, Status, progress_callback
 from .table import Table
+from .projection import Projection, parse_projection
 from .table_files import parse_table
 from .transport import Transport
 
@@ -76,6 +77,10 @@ class Job:
     def table(self) -> Table:
         """The table of a successful job."""
         return parse_table(self.read("table", "json"))
+
+    def projection(self) -> Projection:
+        """What a successful job whose measure has a member "project" gives."""
+        return parse_projection(self.read("projection", "json"))
 
     def report(self) -> dict[str, Any]:
         """What was chosen, skipped and counted, the error reached, the surface's statistics, warnings."""

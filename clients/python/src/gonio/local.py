@@ -7,17 +7,20 @@ import re
 import subprocess
 import tempfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 import numpy as np
 
 from .document import JobDocument, document_text, read_document, write_array
 from .errors import GonioError, JobDismissed, JobFailed, Refused, TimedOut, Unreachable
+from .projection import Projection, read_projection
 from .status import Progress, Status, progress_callback
 from .table import Table
 from .table_files import read_table
 
+Result = TypeVar("Result")
 REFUSALS = ("invalid_input", "missing_unit", "not_found", "limit", "usage")
 
 
@@ -33,11 +36,28 @@ def run(job: JobDocument | None = None, /, *, program: str = "gonio", threads: i
     >>> table.dims
     ('theta_i', 'phi_i', 'theta_o', 'phi_o', 'channel')
     """
+    return _run(job, members, program, threads, progress, timeout, read_table)
+
+
+def run_projection(job: JobDocument | None = None, /, *, program: str = "gonio", threads: int | None = None,
+                   progress: Progress = False, timeout: float | None = None, **members: Any) -> Projection:
+    """Runs a job whose measure has a member "project" by `gonio run`. As run() else.
+
+    >>> sparse = {"kind": "brdf", "incident": measure["incident"], "project": {"order": 4, "samples": 100}}
+    >>> projection = gonio.run_projection(surface=surface, material=material, measure=sparse, program=program)
+    >>> projection.f(0, 0, 30, 0).shape
+    ()
+    """
+    return _run(job, members, program, threads, progress, timeout, read_projection)
+
+
+def _run(job: JobDocument | None, members: dict[str, Any], program: str, threads: int | None, progress: Progress,
+         timeout: float | None, read: Callable[[str], Result]) -> Result:
     document = read_document(job, members)
-    document["output"] = [{"format": "json", "path": "table.json"}]
+    document["output"] = [{"format": "json", "path": "result.json"}]
     with tempfile.TemporaryDirectory(prefix="gonio_") as folder:
         _run_document(document, folder, program, threads, progress, timeout)
-        return read_table(f"{folder}/table.json")
+        return read(f"{folder}/result.json")
 
 
 def run_files(folder: str | os.PathLike[str], job: JobDocument | None = None, /, *, program: str = "gonio",
