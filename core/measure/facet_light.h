@@ -26,6 +26,7 @@ class FacetLight {
 
     // Draws the shifts of run 0, 1, ...: places inside the facets, directions of the operator.
     void start_run(int run);
+    const std::vector<SubSample>& places() const { return places_; }  // of the run that was started
     // Of the run that was started. The sub-samples of light_irradiance() may be others than samples() says.
     LightIrradiance irradiance(const std::vector<Vec3>& lights);
     Radiosity radiosity(const Fields& irradiance);
