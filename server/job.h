@@ -13,8 +13,10 @@
 #include "measure/btf.h"
 #include "measure/maps.h"
 #include "measure/plan.h"
+#include "measure/relight.h"
 #include "surface/height_field.h"
 #include "surface/io/height_reader.h"
+#include "surface/io/radiance_image.h"
 #include "surface/prepare.h"
 
 namespace gonio {
@@ -54,8 +56,21 @@ struct MaterialSource {
     HeightReader read = read_trusted_heights;
 };
 
+// Light from all around: a map that is not opened before load_job(), or the same radiance from everywhere.
+using RadianceReader = std::function<RadianceImage(const std::string& path)>;
+inline RadianceImage read_trusted_radiance(const std::string& path) {
+    return read_radiance_image(path);
+}
+struct EnvironmentSource {
+    std::vector<double> radiance;  // 1 or 3 values; empty if there is a file
+    std::string path;
+    EnvironmentLayout layout = EnvironmentLayout::automatic;
+    double rotation_deg = 0, scale = 1;
+    RadianceReader read = read_trusted_radiance;
+};
+
 // What is measured. A new kind is one alternative here and one file: measure_kind.h.
-using MeasurePlan = std::variant<BrdfPlan, BtfPlan, MapsPlan, LightFieldPlan>;
+using MeasurePlan = std::variant<BrdfPlan, BtfPlan, MapsPlan, LightFieldPlan, RelightPlan>;
 
 struct OutputRequest {
     std::string format;  // one of its kind's: "csv"
@@ -67,7 +82,8 @@ struct Job {
     MaterialSource material;
     MeasurePlan plan;
     std::vector<OutputRequest> outputs;
-    BaseCurvature base;  // of what the surface stands on
+    BaseCurvature base;                                 // of what the surface stands on
+    std::optional<EnvironmentSource> environment = {};  // of the kinds that take one
 };
 
 // What a document does not say about itself.

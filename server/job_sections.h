@@ -9,6 +9,7 @@ SurfaceSource parse_surface(const JsonNode& node, const std::string& folder);  /
 GeneratedSurface parse_generated_surface(const JsonNode& node);                // parse_generated_surface.cpp
 MaterialSource parse_material(const JsonNode& node, const std::string& folder);  // parse_material.cpp
 BaseCurvature parse_base(const std::optional<JsonNode>& node);  // parse_base.cpp; flat if it is not there
+EnvironmentSource parse_environment(const JsonNode& node, const std::string& folder);  // parse_environment.cpp
 // Every default filled in, the target included.
 Accuracy parse_accuracy(const std::optional<JsonNode>& node);   // parse_accuracy.cpp
 std::vector<AnglesDeg> parse_directions(const JsonNode& node);  // parse_directions.cpp

@@ -29,4 +29,10 @@ LoadedSurface load_surface(const SurfaceSource& source, const BaseCurvature& bas
 Material load_material(const MaterialSource& material, const SurfaceSource& source,
                        const LoadedSurface& surface);
 
+// The environment with its map, if it has one, read. Throws Error with the file's name, or under
+// "/environment".
+Environment load_environment(const EnvironmentSource& source);
+// SHA-256 (hex) of its radiances and where they stand.
+std::string environment_hash(const Environment& environment);
+
 }  // namespace gonio

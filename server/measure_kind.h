@@ -30,6 +30,8 @@ struct MeasureKind {
     // cancelled.
     Report (*run)(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
                   const Monitor& monitor);
+    // Whether it takes the "environment" of the job for its light, and needs one.
+    bool under_environment = false;
 };
 
 // In the order of the alternatives of MeasurePlan.
@@ -46,6 +48,7 @@ Product product_of(const MeasurePlan& plan);
 // One file each.
 MeasureKind brdf_kind();  // kind_brdf.cpp
 MeasureKind btf_kind();
+MeasureKind relight_kind();
 MeasureKind maps_kind();
 MeasureKind light_field_kind();  // kind_btf.cpp
 

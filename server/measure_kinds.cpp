@@ -4,7 +4,8 @@
 namespace gonio {
 
 const std::vector<MeasureKind>& measure_kinds() {
-    static const std::vector<MeasureKind> kinds = {brdf_kind(), btf_kind(), maps_kind(), light_field_kind()};
+    static const std::vector<MeasureKind> kinds = {brdf_kind(), btf_kind(), maps_kind(), light_field_kind(),
+                                                   relight_kind()};
     return kinds;
 }
 

@@ -44,14 +44,24 @@ std::string resolved(const std::string& path, const std::string& folder) {
 Job parse_job(std::string_view text, const JobOrigin& origin) {
     const nlohmann::json document = parse_json_strictly(text);
     const JsonNode root(document);
-    root.allow_keys({"surface", "base", "material", "measure", "accuracy", "output"});
+    root.allow_keys({"surface", "base", "material", "environment", "measure", "accuracy", "output"});
     SurfaceSource surface = parse_surface(root.at("surface"), origin.folder);
     MaterialSource material = parse_material(root.at("material"), origin.folder);
     const JsonNode measure = root.at("measure");
-    MeasurePlan plan = parse_kind(measure).parse(measure, parse_accuracy(root.find("accuracy")));
+    const MeasureKind& kind = parse_kind(measure);
+    std::optional<EnvironmentSource> environment;
+    if (kind.under_environment)
+        environment = parse_environment(root.at("environment"), origin.folder);
+    else if (const auto unused = root.find("environment"))
+        unused->refuse("a measurement of kind \"" + kind.name + "\" has lights of its own");
+    MeasurePlan plan = kind.parse(measure, parse_accuracy(root.find("accuracy")));
     std::vector<OutputRequest> outputs = parse_outputs(root.find("output"), product_of(plan), origin.name);
-    return {std::move(surface), std::move(material), std::move(plan), std::move(outputs),
-            parse_base(root.find("base"))};
+    return {std::move(surface),
+            std::move(material),
+            std::move(plan),
+            std::move(outputs),
+            parse_base(root.find("base")),
+            std::move(environment)};
 }
 
 SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin) {

@@ -5,6 +5,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/sha256.h"
 #include "server/job_hash.h"
 #include "server/measure_kind.h"
 #include "server/projection_file.h"
@@ -43,6 +44,12 @@ LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& refere
     const ReferenceOptions* options = reference ? &*reference : nullptr;
     loaded.hash = job_hash(loaded.surface.hash, loaded.material, job.plan, options);
     loaded.runs_hash = runs_hash(loaded.surface.hash, loaded.material, job.plan, options);
+    if (job.environment) {
+        loaded.environment = load_environment(*job.environment);
+        const std::string key = environment_hash(*loaded.environment);
+        loaded.hash = sha256_hex({loaded.hash, key});
+        loaded.runs_hash = sha256_hex({loaded.runs_hash, key});
+    }
     return loaded;
 }
 

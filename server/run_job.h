@@ -16,8 +16,9 @@ struct LoadedJob {
     Job job;
     LoadedSurface surface;
     Material material;
-    std::optional<ReferenceOptions> reference;  // run by the path tracer instead of the fast engine
-    std::string hash = {};                      // job_hash
+    std::optional<ReferenceOptions> reference;    // run by the path tracer instead of the fast engine
+    std::optional<Environment> environment = {};  // of the kinds that take one; part of both hashes
+    std::string hash = {};                        // job_hash
     std::string runs_hash = {};
 };
 

@@ -27,10 +27,20 @@ const std::vector<ServiceProcess>& service_processes() {
                             "Radiance over position and direction, or over two planes.",
                             "radiance of every facet and which facet each pixel shows; a picture",
                             {{"btf", "application/octet-stream"}, {"png", "image/png"}}),
-        measurement_process(maps_kind(), "Light, shadow and sky on a height field",
-                            "Direct, indirect and total light, shadow, masking and sky, one pixel a cell.",
-                            "all layers, and a sheet of them",
-                            {{"exr", "image/x-exr"}, {"png", "image/png"}, {"arrays", "application/octet-stream"}}),
+        measurement_process(
+            maps_kind(), "Light, shadow and sky on a height field",
+            "Direct, indirect and total light, shadow, masking and sky, one pixel a cell.",
+            "all layers, and a sheet of them",
+            {{"exr", "image/x-exr"}, {"png", "image/png"}, {"arrays", "application/octet-stream"}}),
+        measurement_process(
+            relight_kind(), "A height field under an environment",
+            "Radiance under light from all around: images, facets, and means over the surface.",
+            "the means with their errors, images, and the radiance of every facet",
+            {{"csv", "text/csv"},
+             {"json", "application/json"},
+             {"exr", "image/x-exr"},
+             {"png", "image/png"},
+             {"arrays", "application/octet-stream"}}),
     };
     return processes;
 }

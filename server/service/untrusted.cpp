@@ -185,4 +185,11 @@ RawHeights read_untrusted_heights(const std::string& path) {
                                      : read_heights(path, untrusted_limits);
 }
 
+RadianceImage read_untrusted_radiance(const std::string& path) {
+    if (is_untrusted_format(path))
+        throw Error(ErrorCode::invalid_input, "/environment", "OpenEXR",
+                    "the service reads environments from Radiance .hdr files");
+    return read_radiance_image(path, untrusted_limits);
+}
+
 }  // namespace gonio

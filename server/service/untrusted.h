@@ -5,6 +5,7 @@
 #include <string>
 
 #include "surface/io/height_reader.h"
+#include "surface/io/radiance_image.h"
 
 namespace gonio {
 
@@ -13,6 +14,9 @@ inline constexpr ReadLimits untrusted_limits{1LL << 26, 1LL << 30};
 // A HeightReader: the formats above in a child of this very program (`gonio decode-untrusted`), the others
 // here. A child that breaks its limits or is killed is Error(invalid_input) naming the file.
 RawHeights read_untrusted_heights(const std::string& path);
+
+// A RadianceReader: Radiance .hdr alone, which is decoded here; OpenEXR is refused.
+RadianceImage read_untrusted_radiance(const std::string& path);
 
 // From here on this process has memory, the files that are open, and its end: a call that would open a file,
 // start a process or send anything kills it. Throws Error(internal) where the system has no seccomp filters.

@@ -60,6 +60,8 @@ UploadedFiles resolve_uploads(const json& document, const Objects& objects) {
     const JsonNode root(document);
     if (const auto surface = root.find("surface"); surface && surface->raw().is_object())
         resolver.resolve(*surface, files.document["surface"]);
+    if (const auto environment = root.find("environment"); environment && environment->raw().is_object())
+        resolver.resolve(*environment, files.document["environment"]);
     if (const auto material = root.find("material"))
         resolver.resolve_all(*material, files.document["material"]);
     return files;
@@ -72,6 +74,7 @@ void read_as_untrusted(SurfaceSource& surface) {
 void read_as_untrusted(Job& job) {
     read_as_untrusted(job.surface);
     job.material.read = read_untrusted_heights;
+    if (job.environment) job.environment->read = read_untrusted_radiance;
 }
 
 }  // namespace gonio
