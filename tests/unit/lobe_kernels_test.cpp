@@ -159,8 +159,8 @@ TEST_P(LobeKernels, DirectSumsAreTheMaterialTimesWhatBothSee) {
 }
 
 INSTANTIATE_TEST_SUITE_P(EveryTarget, LobeKernels, testing::Values("", "AVX2", "SSE4"),
-                         [](const auto& info) {
-                             const std::string name = info.param;
+                         [](const auto& target) {
+                             const std::string name = target.param;
                              return name.empty() ? std::string("Best") : name;
                          });
 

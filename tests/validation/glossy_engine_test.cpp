@@ -204,8 +204,9 @@ TEST(GlossyEngine, OrdersAndColoursAddUp) {
             for (size_t order = 1; order <= 3; ++order) {
                 const double f = table.f[table.index(c, order, row)];
                 sum += f;
-                if (c == 1)
+                if (c == 1) {
                     EXPECT_NEAR(f, std::pow(0.5, order) * table.f[table.index(0, order, row)], 1e-5 * f);
+                }
             }
             EXPECT_NEAR(table.f[table.index(c, 0, row)], sum, 1e-5 * sum);
         }
