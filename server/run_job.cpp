@@ -60,7 +60,10 @@ Report run_job(const LoadedJob& loaded, const std::vector<OutputRequest>& files,
         !std::holds_alternative<BrdfPlan>(loaded.job.plan))
         throw Error(ErrorCode::invalid_input, "/measure/kind", kind.name,
                     "only brdf jobs are cut into shards: gonio run");
-    for (const OutputRequest& file : files) make_folder_of(file.path);
+    // Streamed files need their folders now; those of a table are made when there is one (write_outputs), so
+    // that a job whose shards are missing leaves nothing behind.
+    if (!std::holds_alternative<BrdfPlan>(loaded.job.plan))
+        for (const OutputRequest& file : files) make_folder_of(file.path);
     return kind.run(loaded, files, options, monitor);
 }
 

@@ -165,7 +165,7 @@ TEST(JobDocument, SaysWhatWasMeant) {
     // Nothing is near: the allowed keys alone.
     const std::string far = message({{"zzzzzzzz", 1}});
     EXPECT_EQ(far.find("did you mean"), std::string::npos);
-    EXPECT_NE(far.find("surface, base, material, measure, accuracy, output"), std::string::npos);
+    EXPECT_NE(far.find("surface, base, material, environment, measure, accuracy, output"), std::string::npos);
     EXPECT_EQ(message({{"surface", {{"period", 2}}}}),
               "/surface/period = 2: a length needs a unit: one of km, m, cm, mm, um, nm, pm, as in \"2 mm\"");
     EXPECT_EQ(parse_error(base_document({{"surface", {{"period", 2}}}}).dump()).code(),
