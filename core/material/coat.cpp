@@ -108,4 +108,8 @@ double mean_coat_transmittance(double eta, double alpha) {
                    [&](int e) { return between(a, [&](int k) { return table().mean[e * n_alpha + k]; }); });
 }
 
+double coat_base_factor(double eta, double alpha, double albedo) {
+    return albedo / (eta * eta * (1 - albedo) + albedo * mean_coat_transmittance(eta, alpha));
+}
+
 }  // namespace gonio

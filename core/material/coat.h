@@ -12,5 +12,8 @@ double coat_transmittance(double eta, double alpha, double cos_theta);
 
 // Integral of 2 cos_theta coat_transmittance over cos_theta in [0, 1], of the interpolated values exactly.
 double mean_coat_transmittance(double eta, double alpha);
+// Radiance out of the base, per light that passed the coat, to all orders between base and coat, without the
+// two transmittances: albedo for an index of 1, 1 / mean transmittance for a white base.
+double coat_base_factor(double eta, double alpha, double albedo);
 
 }  // namespace gonio

@@ -16,11 +16,7 @@ struct Coat {
         : eta(lobe.eta.at(0, cell.i, cell.j)), alpha(lobe.alpha.at(0, cell.i, cell.j)) {}
     MicrofacetDistribution normals() const { return {Microfacet::Distribution::ggx, alpha, alpha}; }
     double transmittance(double cos_theta) const { return coat_transmittance(eta, alpha, cos_theta); }
-    // Radiance out of the base for light that passed the coat, without the two transmittances: 1 / mean for a
-    // white base.
-    double base(double albedo) const {
-        return albedo / (eta * eta * (1 - albedo) + albedo * mean_coat_transmittance(eta, alpha));
-    }
+    double base(double albedo) const { return coat_base_factor(eta, alpha, albedo); }
 };
 
 // Of sampling the coat rather than the base.
