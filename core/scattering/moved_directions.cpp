@@ -1,7 +1,9 @@
 #include "scattering/moved_directions.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "base/parallel.h"
 #include "visibility/curvature.h"
@@ -40,6 +42,32 @@ Fans make_fans(const DirectionSet& set, int part, int n_parts) {
     fans.mesh = triangulate(fans.still);
     fan_solid_angles(fans.mesh, fans.still, fans.solid_angle);
     return fans;
+}
+
+// Directions that meet nothing move with those beside them that do: what they pass is the horizon, which
+// bends away with the relief. Were they to stay, the gap between would open on both sides of the horizon
+// alike, and only half of what bending hides would be lost.
+void move_horizon(const Fans& fans, const std::vector<char>& meets, std::vector<Vec3>& moved) {
+    std::vector<Vec3> shift(moved.size());
+    std::vector<int> n(moved.size(), 0);
+    for (const std::array<int, 3>& triangle : fans.mesh.triangles)
+        for (int side = 0; side < 3; ++side) {
+            const int a = triangle[side], b = triangle[(side + 1) % 3];
+            for (const auto& [from, to] : {std::pair{a, b}, {b, a}}) {
+                if (!meets[from] || meets[to]) continue;
+                shift[to].x += moved[from].x - fans.still[from].x;
+                shift[to].y += moved[from].y - fans.still[from].y;
+                shift[to].z += moved[from].z - fans.still[from].z;
+                ++n[to];
+            }
+        }
+    for (size_t k = 0; k < moved.size(); ++k) {
+        if (n[k] == 0) continue;
+        const Vec3 d{moved[k].x + shift[k].x / n[k], moved[k].y + shift[k].y / n[k],
+                     moved[k].z + shift[k].z / n[k]};
+        const double length = std::sqrt(dot(d, d));
+        moved[k] = {d.x / length, d.y / length, d.z / length};
+    }
 }
 
 // Links of one unknown: they may stand in two chunks, by the axis along which they were marched.
@@ -91,6 +119,7 @@ void weigh_moved_directions(const MarchGrid& grid, const Tile& tile, const Direc
     const int n_tasks = static_cast<int>((records.size() + records_together - 1) / records_together);
     parallel_for(n_tasks, n_threads, [&](int task) {
         std::vector<Vec3> moved;
+        std::vector<char> meets;
         std::vector<double> solid_angle;
         // From the first record of an unknown to the last of another, wherever the tasks' borders fall.
         size_t r = task * records_together;
@@ -113,12 +142,15 @@ void weigh_moved_directions(const MarchGrid& grid, const Tile& tile, const Direc
                             origin.travel * step.step_y * grid.pitch_y, 0};
             };
             moved = own.still;
+            meets.assign(moved.size(), 0);
             each_link([&](const LinkOperator::Chunk& chunk, uint32_t l) {
                 const Vec3 to = offset(chunk.origins[l]), d = set.directions[chunk.origins[l].direction];
                 const double rise = d.z * std::hypot(to.x, to.y) / std::hypot(d.x, d.y);
-                moved[own.place[chunk.origins[l].direction]] =
-                    between(from, displaced_position(grid.base, to.x, to.y, from.z + rise));
+                const int place = own.place[chunk.origins[l].direction];
+                meets[place] = 1;
+                moved[place] = between(from, displaced_position(grid.base, to.x, to.y, from.z + rise));
             });
+            move_horizon(own, meets, moved);
             fan_solid_angles(own.mesh, moved, solid_angle);
             each_link([&](LinkOperator::Chunk& chunk, uint32_t l) {
                 const LinkOrigin& origin = chunk.origins[l];

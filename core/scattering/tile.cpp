@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "surface/facet_mesh.h"
+#include "visibility/curvature.h"
 
 namespace gonio {
 
@@ -40,20 +41,21 @@ Tile make_tile(const HeightField& surface, const CellRect& area, const CellRect&
         for (int row = 0; row < area.height; ++row)
             for (int column = 0; column < area.width; ++column) {
                 const int i = area.x0 + column, j = area.y0 + row;
-                Gradient g = facet_gradient(surface, kind, i, j);
-                double stretch = 1;
-                if (surface.base.is_curved()) {
-                    const StretchedFacet facet =
-                        stretched(surface.base, facet_height(surface, kind, i, j), g);
-                    g = facet.gradient;
-                    stretch = facet.stretch;
-                }
-                const double ratio = area_ratio(g);
                 const size_t s = tile.slot(kind, row, column);
+                if (surface.base.is_curved()) {
+                    const auto [normal, facet_area] = displaced_facet(surface, kind, i, j);
+                    tile.normal_x[s] = static_cast<float>(normal.x);
+                    tile.normal_y[s] = static_cast<float>(normal.y);
+                    tile.normal_z[s] = static_cast<float>(normal.z);
+                    tile.sqrt_area[s] = static_cast<float>(std::sqrt(facet_area / tile.n_parts()));
+                    continue;
+                }
+                const Gradient g = facet_gradient(surface, kind, i, j);
+                const double ratio = area_ratio(g);
                 tile.normal_x[s] = static_cast<float>(-g.x / ratio);
                 tile.normal_y[s] = static_cast<float>(-g.y / ratio);
                 tile.normal_z[s] = static_cast<float>(1 / ratio);
-                tile.sqrt_area[s] = static_cast<float>(std::sqrt(0.5 * stretch * ratio / tile.n_parts()));
+                tile.sqrt_area[s] = static_cast<float>(std::sqrt(0.5 * ratio / tile.n_parts()));
             }
     return tile;
 }

@@ -37,6 +37,15 @@ double rms_turn(const LinkOperator& op) {
     return total > 0 ? std::sqrt(sum / total) : 0;
 }
 
+double turn_step(const LinkOperator& op) {
+    return std::clamp(1.5 * rms_turn(op), 1e-3, 0.3);
+}
+
+int turned_coefficients(const BaseCurvature& base) {
+    if (!base.is_curved()) return 1;
+    return base.kappa_1 != 0 && base.kappa_2 != 0 ? 6 : 3;
+}
+
 TurnedLight turned_light(const MarchGrid& grid, const Tile& tile, const std::vector<Vec3>& lights,
                          Fields straight, double step, const std::vector<SubSample>& sub_samples,
                          bool skip_steep, int n_threads, const Monitor& monitor) {

@@ -21,6 +21,10 @@ struct TurnedLight {
 
 // rms of the turns along the links, weighted as light is; radians.
 double rms_turn(const LinkOperator& op);
+// How far lights are best turned for the polynomial: 1.5 times that; most turns lie within.
+double turn_step(const LinkOperator& op);
+// Coefficients that a light takes on a base: 1 on a flat one.
+int turned_coefficients(const BaseCurvature& base);
 
 // The polynomial through lights turned by 0 and +-step, and by both steps together. `straight`:
 // light_irradiance of the lights themselves, at the same places.

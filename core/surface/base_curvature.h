@@ -26,6 +26,7 @@ struct BaseCurvature {
     BaseCorrection correction = BaseCorrection::none;
 
     bool is_curved() const { return kappa_1 != 0 || kappa_2 != 0; }
+    bool is_round() const { return kappa_1 == kappa_2; }  // a sphere, or flat: every azimuth is alike
     bool bends_rays() const { return is_curved() && correction == BaseCorrection::none; }
     bool corrects_horizons() const { return is_curved() && correction != BaseCorrection::none; }
     bool operator==(const BaseCurvature&) const = default;

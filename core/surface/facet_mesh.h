@@ -1,6 +1,7 @@
-// The geometry that is simulated: two flat triangles a cell, diagonal (i,j)-(i+1,j+1). Facet 0 ("lower", u >= v) has the corners
-// (i,j), (i+1,j), (i+1,j+1); facet 1 ("upper", v > u) has (i,j), (i+1,j+1), (i,j+1). Exact normals: texel-centre points with
-// central-difference normals bias the direct term by 0.2-4 % (shared/performance E), which no number of directions removes.
+// The geometry that is simulated: two flat triangles a cell, diagonal (i,j)-(i+1,j+1). Facet 0 ("lower", u >=
+// v) has the corners (i,j), (i+1,j), (i+1,j+1); facet 1 ("upper", v > u) has (i,j), (i+1,j+1), (i,j+1). Exact
+// normals: texel-centre points with central-difference normals bias the direct term by 0.2-4 %
+// (shared/performance E), which no number of directions removes.
 #pragma once
 #include <cmath>
 
@@ -23,24 +24,9 @@ inline Gradient facet_gradient(const HeightField& s, int kind, int i, int j) {
     return {(h11 - h01) / s.pitch_x, (h01 - h00) / s.pitch_y};
 }
 
-// Height of its centroid above the mean, metres.
-inline double facet_height(const HeightField& s, int kind, int i, int j) {
-    const double own = kind == 0 ? s.at(i + 1, j) : s.at(i, j + 1);
-    return (static_cast<double>(s.at(i, j)) + own + s.at(i + 1, j + 1)) / 3;
-}
-
-// What the base makes of a facet at height h: parallel surfaces stretch by I + h K.
-struct StretchedFacet {
-    Gradient gradient;   // in the tangent plane above which the facet stands: (I + h K)^-1 grad h
-    double stretch = 1;  // of base area: det(I + h K)
-};
-inline StretchedFacet stretched(const BaseCurvature& base, double height, const Gradient& g) {
-    const BaseCurvature::Tensor k = base.tensor();
-    const double a = 1 + height * k.xx, b = height * k.xy, d = 1 + height * k.yy, det = a * d - b * b;
-    return {{(d * g.x - b * g.y) / det, (a * g.y - b * g.x) / det}, det};
-}
-
 // Area of a facet over its projected area.
-inline double area_ratio(const Gradient& g) { return std::sqrt(1 + g.x * g.x + g.y * g.y); }
+inline double area_ratio(const Gradient& g) {
+    return std::sqrt(1 + g.x * g.x + g.y * g.y);
+}
 
 }  // namespace gonio

@@ -1,29 +1,62 @@
 #include "visibility/crossings.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
+
+#include "visibility/curvature.h"
 
 namespace gonio {
 namespace {
 
 constexpr double edge_margin = 1e-4;
 
-// Next crossings of one family of parallel grid lines: coordinate p(t) = p0 + rate t crosses integers at
-// first + k step.
-struct LineFamily {
-    double first, step;
-    LineFamily(double p0, double rate) {
-        constexpr double never = 1e300;
-        if (std::abs(rate) < 1e-9) {
-            first = never;
-            step = 0;
+// Crossings of one family of parallel grid lines, one after the other: the coordinate
+// p(t) = p0 + rate t + bend t^2 passes integers.
+class LineFamily {
+  public:
+    LineFamily(double p0, double rate, double bend) : p0_(p0), rate_(rate), bend_(bend) {
+        const bool up = bend == 0 ? rate > 0 : rate > 0 || (rate == 0 && bend > 0);
+        side_ = up ? 1 : -1;
+        line_ = up ? std::floor(p0 + 1e-7) + 1 : std::ceil(p0 - 1e-7) - 1;
+        if (bend != 0) {
+            travel_ = bent_travel();
+        } else if (std::abs(rate) < 1e-9) {
+            first_ = travel_ = never;
         } else {
-            const double next = rate > 0 ? std::floor(p0 + 1e-7) + 1 : std::ceil(p0 - 1e-7) - 1;
-            first = (next - p0) / rate;
-            step = 1 / std::abs(rate);
+            first_ = travel_ = (line_ - p0) / rate;
+            step_ = 1 / std::abs(rate);
         }
     }
+    double travel() const { return travel_; }  // to the next crossing
+    void advance() {
+        if (bend_ == 0) {
+            travel_ = first_ + ++n_ * step_;  // and not repeated addition: no error builds up
+        } else {
+            line_ += side_;
+            travel_ = bent_travel();
+        }
+    }
+
+  private:
+    static constexpr double never = 1e300;
+    double bent_travel() {
+        double squared = rate_ * rate_ + 4 * bend_ * (line_ - p0_);
+        if (squared < 0) {  // the path turns before this line and crosses the last one again
+            side_ = -side_;
+            line_ += side_;
+            squared = std::max(0.0, rate_ * rate_ + 4 * bend_ * (line_ - p0_));
+        }
+        const double velocity = side_ * std::sqrt(squared);
+        const double t =
+            rate_ * side_ > 0 ? 2 * (line_ - p0_) / (rate_ + velocity) : (velocity - rate_) / (2 * bend_);
+        return t > 0 ? t : never;
+    }
+
+    double p0_, rate_, bend_, line_, travel_ = never, first_ = never, step_ = 0;
+    int side_, n_ = 0;
 };
 
 struct RawCrossing {
@@ -32,40 +65,40 @@ struct RawCrossing {
     int cell_x, cell_y, kind;  // of the facet crossed before it
 };
 
-std::vector<RawCrossing> list_crossings(double u, double v, double dx, double dy, double max_travel) {
+std::vector<RawCrossing> list_crossings(const RayPath& path, double max_travel) {
     std::vector<RawCrossing> list;
-    const LineFamily vertical(u, dx), horizontal(v, dy), diagonal(u - v, dx - dy);
-    double next_v = vertical.first, next_h = horizontal.first, next_d = diagonal.first, previous = 0;
-    int n_v = 0, n_h = 0, n_d = 0;  // first + k step, and not repeated addition: no error builds up
+    LineFamily vertical(path.u, path.step_u, path.bend_u), horizontal(path.v, path.step_v, path.bend_v),
+        diagonal(path.u - path.v, path.step_u - path.step_v, path.bend_u - path.bend_v);
+    double previous = 0;
     for (;;) {
-        const double travel = std::min({next_v, next_h, next_d});
+        const double travel = std::min({vertical.travel(), horizontal.travel(), diagonal.travel()});
         if (travel > max_travel) break;
-        const double x = u + dx * travel, y = v + dy * travel;
-        const double mid_x = u + dx * 0.5 * (travel + previous), mid_y = v + dy * 0.5 * (travel + previous);
+        const auto [x, y] = path.at(travel);
+        const auto [mid_x, mid_y] = path.at(0.5 * (travel + previous));
         RawCrossing c;
         c.travel = travel;
         c.cell_x = static_cast<int>(std::floor(mid_x));
         c.cell_y = static_cast<int>(std::floor(mid_y));
         c.kind = (mid_x - c.cell_x) >= (mid_y - c.cell_y) ? 0 : 1;
-        if (travel == next_v) {
+        if (travel == vertical.travel()) {
             c.x0 = c.x1 = static_cast<int>(std::lround(x));
             c.y0 = static_cast<int>(std::floor(y + 1e-9));
             c.y1 = c.y0 + 1;
             c.weight = y - c.y0;
-            next_v = vertical.first + ++n_v * vertical.step;
-        } else if (travel == next_h) {
+            vertical.advance();
+        } else if (travel == horizontal.travel()) {
             c.y0 = c.y1 = static_cast<int>(std::lround(y));
             c.x0 = static_cast<int>(std::floor(x + 1e-9));
             c.x1 = c.x0 + 1;
             c.weight = x - c.x0;
-            next_h = horizontal.first + ++n_h * horizontal.step;
+            horizontal.advance();
         } else {
             c.x0 = static_cast<int>(std::floor(x + 1e-9));
             c.y0 = c.x0 - static_cast<int>(std::lround(x - y));
             c.x1 = c.x0 + 1;
             c.y1 = c.y0 + 1;
             c.weight = x - c.x0;
-            next_d = diagonal.first + ++n_d * diagonal.step;
+            diagonal.advance();
         }
         c.weight = std::clamp(c.weight, 0.0, 1.0);
         list.push_back(c);
@@ -178,8 +211,17 @@ int facet_part(int kind, double u, double v, int refinement) {
 
 namespace {
 
+// What carries a path sideways over the base, in cells, per pitch_x^2 of (travel times height): a point of
+// height h is h K d further along d than its foot, of which the part across d is what this takes back.
+std::array<double, 2> sideways_drift(const MarchGrid& grid, double x, double y) {
+    const double length = std::hypot(x, y), dx = x / length, dy = y / length;
+    const BaseCurvature::Tensor k = grid.base.tensor();
+    const double across = -grid.pitch_x * (dx * (k.xy * dx + k.yy * dy) - dy * (k.xx * dx + k.xy * dy));
+    return {-dy * across, dx * across * grid.pitch_x / grid.pitch_y};
+}
+
 RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
-                      double max_travel, bool bends) {
+                      double max_travel, bool bends, const StartHeights& heights) {
     RayBundle bundle;
     bundle.direction = to_march_direction(grid, direction);
     bundle.start = start;
@@ -195,12 +237,25 @@ RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetP
     const double weights[2][3] = {{1 - u, u - v, v}, {1 - v, v - u, u}};
     for (int k = 0; k < 3; ++k) bundle.start_weight[k] = static_cast<float>(weights[kind][k]);
 
+    bundle.path = {u, v, dx, dy};
     std::optional<Bend> bend;
     if (bends) {
         const double x = bundle.transposed ? dy : dx,
                      y = (bundle.transposed ? dx : dy) * grid.pitch_y / grid.pitch_x,
                      kappa = grid.pitch_x * grid.base.along(x, y), length = std::hypot(x, y);
         if (kappa != 0) bend = Bend{kappa, length, rise / length};
+        if (!grid.base.is_round()) {
+            auto [drift_u, drift_v] = sideways_drift(grid, x, y);
+            if (bundle.transposed) std::swap(drift_u, drift_v);
+            bundle.path.step_u += drift_u * length * heights.typical;
+            bundle.path.step_v += drift_v * length * heights.typical;
+            // A ray so steep that it passes the layer within a cell hardly drifts on its way.
+            const double range = static_cast<double>(grid.highest) - grid.lowest,
+                         climb = std::clamp(rise, -range, range);
+            bundle.path.bend_u = drift_u * length * climb;
+            bundle.path.bend_v = drift_v * length * climb;
+        }
+        bundle.heights = heights;
     }
     double travel = max_travel;
     if (bend) {
@@ -215,7 +270,7 @@ RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetP
         if (plane.ny == 1 && rise >= 0)
             travel = std::min(travel, plane.nx / std::max(std::abs(dx), 1e-6) + 2);
     }
-    std::vector<RawCrossing> list = list_crossings(u, v, dx, dy, travel);
+    std::vector<RawCrossing> list = list_crossings(bundle.path, travel);
     if (bend)  // a steep ray leaves long before it is as steep as the base
         std::erase_if(list, [&](const RawCrossing& c) { return !(bend->scale(c.travel) > 0); });
 
@@ -232,7 +287,7 @@ RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetP
     if (bend) {
         bundle.bent = true;
         bundle.kappa = static_cast<float>(bend->kappa);
-        float lowest = grid.highest;
+        float lowest = std::numeric_limits<float>::infinity();
         for (const RawCrossing& c : list) {
             lowest = std::min(
                 lowest, static_cast<float>(bend->scale(c.travel) * grid.highest - bend->rise(c.travel)));
@@ -245,18 +300,55 @@ RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetP
 
 }  // namespace
 
+std::vector<StartHeights> start_heights(const MarchGrid& grid, const Vec3& direction) {
+    constexpr double most_turn = 0.01;  // of a path against the typical one, radians
+    const MarchDirection step = to_march_direction(grid, direction);
+    if (!grid.base.bends_rays() || grid.base.is_round()) return {StartHeights{}};
+    const auto [drift_x, drift_y] =
+        sideways_drift(grid, step.step_x, step.step_y * grid.pitch_y / grid.pitch_x);
+    const double range = static_cast<double>(grid.highest) - grid.lowest,
+                 drift = std::hypot(drift_x, drift_y * grid.pitch_y / grid.pitch_x);
+    const int n = std::clamp(static_cast<int>(std::ceil(drift * range / (2 * most_turn))), 1, 64);
+    if (n == 1) return {StartHeights{}};
+    std::vector<StartHeights> layers(n);
+    for (int k = 0; k < n; ++k) {
+        const auto bound = [&](int edge) { return static_cast<float>(grid.lowest + range * edge / n); };
+        layers[k].typical = grid.lowest + range * (k + 0.5) / n;
+        if (k > 0) layers[k].from = bound(k);
+        if (k + 1 < n) layers[k].below = bound(k + 1);
+    }
+    return layers;
+}
+
 RayBundle make_ray_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
-                          double max_travel) {
-    return make_bundle(grid, direction, start, max_travel, grid.base.bends_rays());
+                          double max_travel, const StartHeights& heights) {
+    return make_bundle(grid, direction, start, max_travel, grid.base.bends_rays(), heights);
 }
 
 RayBundle make_level_bundle(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
                             double max_travel) {
-    return make_bundle(grid, direction, start, max_travel, false);
+    return make_bundle(grid, direction, start, max_travel, false, {});
+}
+
+ViewEntry view_entry(const MarchGrid& grid, const Vec3& view, double height) {
+    const double climb = grid.highest - height, horizontal = std::hypot(view.x, view.y);
+    if (!grid.base.bends_rays() || climb <= 0 || horizontal < 1e-12)
+        return {climb * view.x / view.z, climb * view.y / view.z * (grid.pitch_x / grid.pitch_y), view};
+    const double kappa = grid.pitch_x * grid.base.along(view.x, view.y), slope = view.z / horizontal;
+    double distance = climb / slope;
+    if (kappa != 0) distance = Bend{kappa, 1, slope}.travel_to(height, grid.highest).value_or(distance);
+    const auto [drift_x, drift_y] = sideways_drift(grid, view.x, view.y);
+    const double sideways = distance * (height + slope * distance),
+                 x = distance * view.x / horizontal + sideways * drift_x,
+                 y = distance * view.y / horizontal * (grid.pitch_x / grid.pitch_y) + sideways * drift_y;
+    return {x, y, turned_direction(view, grid.base, x * grid.pitch_x, y * grid.pitch_y)};
 }
 
 RayBundle make_view_bundle(const MarchGrid& grid, const Vec3& view, double u, double v, double max_travel) {
-    RayBundle bundle = make_ray_bundle(grid, {-view.x, -view.y, -view.z}, {u >= v ? 0 : 1, u, v}, max_travel);
+    StartHeights top;
+    top.typical = grid.highest;
+    RayBundle bundle =
+        make_ray_bundle(grid, {-view.x, -view.y, -view.z}, {u >= v ? 0 : 1, u, v}, max_travel, top);
     bundle.from_above = true;
     bundle.start_height = grid.highest;
     return bundle;

@@ -68,7 +68,8 @@ void check_base(const HeightField& surface) {
                  pitch = std::max(surface.pitch_x, surface.pitch_y);
     for (const auto& [name, kappa] :
          {std::pair{"/base/kappa_1", surface.base.kappa_1}, {"/base/kappa_2", surface.base.kappa_2}}) {
-        auto refuse = [&](double length, double most, const std::string& what) {
+        // Named again for clang 14, which captures no structured bindings.
+        auto refuse = [name = name, kappa = kappa](double length, double most, const std::string& what) {
             throw Error(ErrorCode::invalid_input, name,
                         text_of(kappa) + " 1/m (radius " + text_of(1 / std::abs(kappa)) + " m)",
                         what + " of " + text_of(length) + " m allows at most " + text_of(most / length) +
@@ -110,6 +111,29 @@ Vec3 displaced_position(const BaseCurvature& base, double x, double y, double he
     const double sinc = turn == 0 ? 1 : std::sin(turn) / turn;
     const double out = (1 + kappa * height) * sinc;
     return {out * x, out * y, height * std::cos(turn) - (kappa == 0 ? 0 : 2 * half * half / kappa)};
+}
+
+DisplacedFacet displaced_facet(const HeightField& surface, int kind, int i, int j) {
+    // Nodes in cells from the corner (i, j), counter-clockwise; the centroid of kind 0 is (2/3, 1/3).
+    const int nodes[2][3][2] = {{{0, 0}, {1, 0}, {1, 1}}, {{0, 0}, {1, 1}, {0, 1}}};
+    const double middle_x = kind == 0 ? 2.0 / 3 : 1.0 / 3, middle_y = 1 - middle_x;
+    // Along each principal direction as on a cylinder: right at every azimuth, a facet being small.
+    const BaseCurvature& base = surface.base;
+    const double c = std::cos(base.direction), s = std::sin(base.direction);
+    Vec3 corner[3];
+    for (int k = 0; k < 3; ++k) {
+        const double x = (nodes[kind][k][0] - middle_x) * surface.pitch_x,
+                     y = (nodes[kind][k][1] - middle_y) * surface.pitch_y,
+                     height = surface.at(i + nodes[kind][k][0], j + nodes[kind][k][1]);
+        const Vec3 p = displaced_position({base.kappa_1, 0, 0}, c * x + s * y, 0, height),
+                   q = displaced_position({base.kappa_2, 0, 0}, c * y - s * x, 0, height);
+        corner[k] = {c * p.x - s * q.x, s * p.x + c * q.x, p.z + q.z - height};
+    }
+    const Vec3 a{corner[1].x - corner[0].x, corner[1].y - corner[0].y, corner[1].z - corner[0].z},
+        b{corner[2].x - corner[0].x, corner[2].y - corner[0].y, corner[2].z - corner[0].z},
+        n{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    const double length = std::sqrt(dot(n, n));
+    return {{n.x / length, n.y / length, n.z / length}, 0.5 * length / (surface.pitch_x * surface.pitch_y)};
 }
 
 }  // namespace gonio

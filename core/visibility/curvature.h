@@ -52,4 +52,12 @@ std::vector<std::string> base_warnings(const HeightField& surface);
 // Where a point at base offset (x, y) and height h stands in the frame of the base point at the origin.
 Vec3 displaced_position(const BaseCurvature& base, double x, double y, double height);
 
+// The flat triangle between the displaced nodes of a facet (surface/facet_mesh.h), in the frame of the base
+// at its centroid.
+struct DisplacedFacet {
+    Vec3 normal;
+    double area;  // over that of the base, pitch_x pitch_y
+};
+DisplacedFacet displaced_facet(const HeightField& surface, int kind, int i, int j);
+
 }  // namespace gonio

@@ -41,7 +41,7 @@ HWY_INLINE const float* node_at(const MarchPlane& plane, const std::vector<float
     return nodes.data() + static_cast<size_t>(r) * plane.stride + c + b.lane;
 }
 
-// Height of the start points, and which rays leave the front of their facet.
+// Height of the start points, and which rays are of the bundle and leave the front of their facet.
 HWY_INLINE void start_rays(const Block& b, int offset, VF& height, M& front) {
     const D d;
     const MarchPlane& plane = *b.plane;
@@ -64,10 +64,13 @@ HWY_INLINE void start_rays(const Block& b, int offset, VF& height, M& front) {
                                    hn::Mul(h11, hn::Set(d, bundle.start_weight[2]))));
     VF rise = hn::Set(d, static_cast<float>(bundle.direction.rise));
     if (bundle.bent) rise = hn::MulAdd(hn::Mul(rise, hn::Set(d, bundle.kappa)), height, rise);
-    const VF facing = hn::NegMulAdd(
-        gradient_x, hn::Set(d, static_cast<float>(bundle.direction.step_x)),
-        hn::NegMulAdd(gradient_y, hn::Set(d, static_cast<float>(bundle.direction.step_y)), rise));
+    const VF facing =
+        hn::NegMulAdd(gradient_x, hn::Set(d, static_cast<float>(bundle.path.step_u)),
+                      hn::NegMulAdd(gradient_y, hn::Set(d, static_cast<float>(bundle.path.step_v)), rise));
     front = hn::Gt(facing, hn::Zero(d));
+    if (!bundle.heights.all())
+        front = hn::And(front, hn::And(hn::Ge(height, hn::Set(d, bundle.heights.from)),
+                                       hn::Lt(height, hn::Set(d, bundle.heights.below))));
 }
 
 HWY_INLINE uint32_t mask_bits(M mask) {
@@ -310,6 +313,21 @@ void march_visible(const MarchGrid& grid, const RayBundle& bundle, const CellRec
             for (int r = 0; r < rows; ++r)
                 visible[static_cast<size_t>(turned * march_block + r) * words + word] = square[r];
         }
+}
+
+bool visible_along(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start, double max_travel,
+                   const CellRect& rect, uint32_t* visible) {
+    const std::vector<StartHeights> layers = start_heights(grid, direction);
+    bool truncated = false;
+    std::vector<uint32_t> of_layer(
+        layers.size() > 1 ? static_cast<size_t>(words_for(rect.width)) * rect.height : 0);
+    for (size_t k = 0; k < layers.size(); ++k) {
+        const RayBundle bundle = make_ray_bundle(grid, direction, start, max_travel, layers[k]);
+        march_visible(grid, bundle, rect, k == 0 ? visible : of_layer.data());
+        for (size_t word = 0; k > 0 && word < of_layer.size(); ++word) visible[word] |= of_layer[word];
+        truncated = truncated || bundle.truncated;
+    }
+    return truncated;
 }
 
 void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int row, int width, int n_lines,

@@ -19,7 +19,12 @@ inline int words_for(int width) {
 // visible[row * words_for(width) + word]: bit c set if the ray from cell (32 word + c, row) of the rectangle
 // leaves its facet's front and meets nothing. Bits beyond the width are 0. `rect` is in untransposed cells,
 // and so is the result, whichever way it marches.
+// Rays that are not of the bundle (RayBundle::heights) count as hidden.
 void march_visible(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, uint32_t* visible);
+
+// The same for all rays of a direction, in as many bundles as it needs. Returns whether one was truncated.
+bool visible_along(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start, double max_travel,
+                   const CellRect& rect, uint32_t* visible);
 
 // The scattering map S_i of one bundle, some lanes of it: for the `n_lines` lines of cells that start at
 // (column, row) and are `width` long, which crossing is the first below the relief. Lines run along x, or
@@ -36,9 +41,10 @@ void march_hits(const MarchGrid& grid, const RayBundle& bundle, int column, int 
 
 // Horizon of every cell of the rectangle along the bundle's horizontal direction (its rise is not used):
 // largest (height of the relief - height of the start) / horizontal travel over the break points of the
-// profile, which is exact for the mesh; never below 0. Of the flat relief: see make_level_bundle. slope is metric (tan of the elevation). slope[row *
-// width + column] in untransposed cells. distance: horizontal, metres, to the break point that is the
-// horizon, 0 where none stands higher than the start; left out if null.
+// profile, which is exact for the mesh; never below 0. Of the flat relief: see make_level_bundle. slope is
+// metric (tan of the elevation). slope[row * width + column] in untransposed cells. distance: horizontal,
+// metres, to the break point that is the horizon, 0 where none stands higher than the start; left out if
+// null.
 void march_horizon(const MarchGrid& grid, const RayBundle& bundle, const CellRect& rect, float* horizon_slope,
                    float* horizon_distance = nullptr);
 

@@ -1,10 +1,11 @@
 #include "visibility/view_map.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "visibility/march.h"
-#include "visibility/ray_cast.h"
 
 namespace gonio {
 namespace {
@@ -32,10 +33,37 @@ struct Place {
     }
 };
 
-// Part of the facet (kind, column, row) that the falling ray meets: both are linear, so one division tells
-// where.
-int part_of_hit(const MarchPlane& plane, const RayBundle& bundle, const CrossedFacet& facet, int column,
-                int row, int refinement) {
+// i in [0, 2 n).
+int into_period(int i, int n) {
+    return i < n ? i : i - n;
+}
+
+// How far the relief stands above a falling ray at crossing k, whose cell (0, 0) is (column, row).
+double above_ray(const MarchPlane& plane, const RayBundle& bundle, int k, int column, int row) {
+    const Crossing& c = bundle.crossings[k];
+    const float* node = &plane.heights[static_cast<size_t>(wrap_index(row + c.row, plane.ny)) * plane.stride +
+                                       wrap_index(column + c.column, plane.nx)];
+    return static_cast<double>(node[0]) * c.weight0 + static_cast<double>(node[c.second_node]) * c.weight1 -
+           c.rise - bundle.start_height;
+}
+
+// Part of the facet (kind, column, row) that the falling ray meets just before crossing k: both are linear,
+// so one division tells where, or, of a bent ray, the two crossings on either side.
+int part_of_hit(const MarchPlane& plane, const RayBundle& bundle, int k, int column, int row,
+                int refinement) {
+    const CrossedFacet& facet = bundle.facets[k];
+    if (bundle.bent && k > 0) {
+        const int own_column = column - facet.column, own_row = row - facet.row;
+        const double before = above_ray(plane, bundle, k - 1, own_column, own_row),
+                     after = above_ray(plane, bundle, k, own_column, own_row),
+                     share = after > before ? std::clamp(before / (before - after), 0.0, 1.0) : 0.0;
+        auto [x, y] =
+            bundle.path.at(bundle.facets[k - 1].travel +
+                           share * (static_cast<double>(facet.travel) - bundle.facets[k - 1].travel));
+        x -= facet.column, y -= facet.row;
+        if (bundle.transposed) std::swap(x, y);
+        return facet_part(bundle.transposed ? 1 - facet.kind : facet.kind, x, y, refinement);
+    }
     const float* h = &plane.heights[static_cast<size_t>(row) * plane.stride + column];
     const double h00 = h[0], h11 = h[plane.stride + 1], own = h[facet.kind == 0 ? 1 : plane.stride];
     const double slope_u = facet.kind == 0 ? own - h00 : h11 - own,
@@ -59,15 +87,14 @@ ViewMap make_view_map(const MarchGrid& grid, const Vec3& view, const PixelGrid& 
     map.facet.resize(static_cast<size_t>(pixels.nx) * pixels.ny);
     const int nx = grid.rows.nx, ny = grid.rows.ny;
     // From the pixel's plane up to the highest point, along the view ray.
-    const double climb = grid.highest - pixels.plane_height / grid.pitch_x, shift_x = climb * view.x / view.z,
-                 shift_y = climb * view.y / view.z * (grid.pitch_x / grid.pitch_y);
+    const auto [shift_x, shift_y, entering] = view_entry(grid, view, pixels.plane_height / grid.pitch_x);
     const Axis x_axis(pixels.area.width, pixels.nx), y_axis(pixels.area.height, pixels.ny);
     HitLines lines;
     for (int cy = 0; cy < y_axis.n_classes; ++cy)
         for (int cx = 0; cx < x_axis.n_classes; ++cx) {
             const Place x(pixels.area.x0 + (cx + sample_x) * pixels.area.width / pixels.nx + shift_x, nx),
                 y(pixels.area.y0 + (cy + sample_y) * pixels.area.height / pixels.ny + shift_y, ny);
-            const RayBundle bundle = make_view_bundle(grid, view, x.inside, y.inside, max_view_travel);
+            const RayBundle bundle = make_view_bundle(grid, entering, x.inside, y.inside, max_view_travel);
             const bool turned = bundle.transposed;
             const MarchPlane& plane = turned ? grid.transposed : grid.rows;
             const Axis &along = turned ? y_axis : x_axis, &across = turned ? x_axis : y_axis;
@@ -75,54 +102,83 @@ ViewMap make_view_map(const MarchGrid& grid, const Vec3& view, const PixelGrid& 
             const int width = (along.count - 1) * along.step + 1, words = words_for(width);
             const int n_lines = across.step == 1 ? across.count : 1;
             const int last = static_cast<int>(bundle.crossings.size()) - 1;
+            // Where the facet behind a crossing lies for the ray of the first pixel.
+            std::vector<int> columns, rows;
+            for (const CrossedFacet& facet : bundle.facets) {
+                columns.push_back(wrap_index(first_along + facet.column, plane.nx));
+                rows.push_back(wrap_index(first_across + facet.row, plane.ny));
+            }
             for (int q = 0; q < across.count; q += n_lines) {
                 march_hits(grid, bundle, first_along, wrap_index(first_across + q * across.step, plane.ny),
                            width, n_lines, lines);
+                const size_t stride = static_cast<size_t>(words) * march_block;
                 for (int line = 0; line < n_lines; ++line)
                     for (int p = 0; p < along.count; ++p) {
                         const int lane = p * along.step;
-                        const size_t at = static_cast<size_t>(line) * words + lane / march_block;
-                        const bool hit = lines.hit[at] >> (lane % march_block) & 1;
-                        const CrossedFacet& facet =
-                            bundle.facets[hit ? lines.crossing[at * march_block + lane % march_block] : last];
-                        map.unresolved += !hit;
-                        int column = first_along + lane + facet.column,
-                            row = first_across + (q + line) * across.step + facet.row;
-                        if (column < 0 || column >= plane.nx) column = wrap_index(column, plane.nx);
-                        if (row < 0 || row >= plane.ny) row = wrap_index(row, plane.ny);
-                        const int part =
-                            refinement == 1 ? 0 : part_of_hit(plane, bundle, facet, column, row, refinement);
-                        const int i = cx + (turned ? q + line : p) * x_axis.n_classes,
-                                  j = cy + (turned ? p : q + line) * y_axis.n_classes;
-                        map.facet[static_cast<size_t>(j) * pixels.nx + i] = static_cast<uint32_t>(
-                            turned ? facet_index(nx, ny, part, 1 - facet.kind, column, row)
-                                   : facet_index(nx, ny, part, facet.kind, row, column));
+                        if (!(lines.hit[static_cast<size_t>(line) * words + lane / march_block] >>
+                                  (lane % march_block) &
+                              1)) {
+                            lines.crossing[line * stride + lane] = last;
+                            ++map.unresolved;
+                        }
                     }
+                // Of the pixel at (line, p): the innermost loop runs along the rows of the image.
+                const auto put = [&](int line, int p) {
+                    const int lane = p * along.step, crossing = lines.crossing[line * stride + lane];
+                    const CrossedFacet& facet = bundle.facets[crossing];
+                    const int column = into_period(columns[crossing] + lane, plane.nx),
+                              row = into_period(rows[crossing] + (q + line) * across.step, plane.ny);
+                    const int part =
+                        refinement == 1 ? 0 : part_of_hit(plane, bundle, crossing, column, row, refinement);
+                    const int i = cx + (turned ? q + line : p) * x_axis.n_classes,
+                              j = cy + (turned ? p : q + line) * y_axis.n_classes;
+                    map.facet[static_cast<size_t>(j) * pixels.nx + i] =
+                        static_cast<uint32_t>(turned ? facet_index(nx, ny, part, 1 - facet.kind, column, row)
+                                                     : facet_index(nx, ny, part, facet.kind, row, column));
+                };
+                if (turned)
+                    for (int p = 0; p < along.count; ++p)
+                        for (int line = 0; line < n_lines; ++line) put(line, p);
+                else
+                    for (int line = 0; line < n_lines; ++line)
+                        for (int p = 0; p < along.count; ++p) put(line, p);
             }
         }
     return map;
 }
 
-ViewMap make_camera_map(const MarchGrid& grid, const Vec3& place, const PixelGrid& pixels, double sample_x,
-                        double sample_y, int refinement) {
+ViewMap make_camera_map(const TraceGrid& grid, const HeightField& surface, const Vec3& place,
+                        const PixelGrid& pixels, double sample_x, double sample_y, int refinement) {
+    constexpr size_t together = 4096;  // rays
     ViewMap map;
-    map.facet.reserve(static_cast<size_t>(pixels.nx) * pixels.ny);
-    const double top = grid.highest * grid.pitch_x;
+    map.facet.assign(static_cast<size_t>(pixels.nx) * pixels.ny, 0);
+    RayBatch rays, hits, escaped;
+    for (RayBatch* batch : {&rays, &hits, &escaped}) batch->reserve(together);
+    std::vector<int32_t> lost;
+    const double top = grid.highest * surface.pitch_x;
+    const auto trace = [&] {
+        map.unresolved += static_cast<long long>(trace_rays(grid, rays, hits, escaped, lost));
+        for (size_t k = 0; k < hits.n; ++k)
+            map.facet[hits.id[k]] = static_cast<uint32_t>(
+                facet_index(grid.nx, grid.ny, facet_part(hits.kind[k], hits.u[k], hits.v[k], refinement),
+                            hits.kind[k], hits.j[k], hits.i[k]));
+    };
     for (int j = 0; j < pixels.ny; ++j)
         for (int i = 0; i < pixels.nx; ++i) {
             const Vec3 pixel{
-                (pixels.area.x0 + (i + sample_x) * pixels.area.width / pixels.nx) * grid.pitch_x,
-                (pixels.area.y0 + (j + sample_y) * pixels.area.height / pixels.ny) * grid.pitch_y,
+                (pixels.area.x0 + (i + sample_x) * pixels.area.width / pixels.nx) * surface.pitch_x,
+                (pixels.area.y0 + (j + sample_y) * pixels.area.height / pixels.ny) * surface.pitch_y,
                 pixels.plane_height};
             const Vec3 ray{pixel.x - place.x, pixel.y - place.y, pixel.z - place.z};
             const double climb =
                 (top - pixel.z) / ray.z;  // from the pixel to the highest point, in lengths of `ray`
-            const std::optional<uint32_t> facet = cast_from_above(
-                grid, (pixel.x + climb * ray.x) / grid.pitch_x, (pixel.y + climb * ray.y) / grid.pitch_y,
-                to_march_direction(grid, ray), refinement);
-            map.facet.push_back(facet.value_or(0));
-            map.unresolved += !facet;
+            const Place x((pixel.x + climb * ray.x) / surface.pitch_x, grid.nx),
+                y((pixel.y + climb * ray.y) / surface.pitch_y, grid.ny);
+            rays.add(grid, x.cell, y.cell, static_cast<float>(x.inside), static_cast<float>(y.inside),
+                     grid.highest, ray, j * pixels.nx + i);
+            if (rays.n == together) trace();
         }
+    trace();
     return map;
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "visibility/grid_tracer.h"
 #include "visibility/march_grid.h"
 
 namespace gonio {
@@ -30,13 +31,15 @@ struct ViewMap {
 };
 
 // view.z > 0, unit. (sample_x, sample_y): the place inside the pixel, in [0, 1); (1/2, 1/2) is its centre.
-// refinement: parts of a facet along each side.
+// refinement: parts of a facet along each side. On a curved base the view is told in the frame of the pixel
+// and its rays are bent; one that leaves over the horizon of the base counts as unresolved.
 ViewMap make_view_map(const MarchGrid& grid, const Vec3& view, const PixelGrid& pixels, double sample_x,
                       double sample_y, int refinement);
 
 // The same for a camera at `place` (x, y of the surface, z above its mean height; metres), above the relief
-// and the pixels' plane: each pixel has a ray of its own (ray_cast.h), 20 times slower.
-ViewMap make_camera_map(const MarchGrid& grid, const Vec3& place, const PixelGrid& pixels, double sample_x,
-                        double sample_y, int refinement);
+// and the pixels' plane: each pixel has a ray of its own (grid_tracer.h). A ray within 1e-6 of a cell of an
+// edge may show the facet beyond it.
+ViewMap make_camera_map(const TraceGrid& grid, const HeightField& surface, const Vec3& place,
+                        const PixelGrid& pixels, double sample_x, double sample_y, int refinement);
 
 }  // namespace gonio

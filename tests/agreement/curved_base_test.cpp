@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
-#include <memory>
 
 #include "agreement/curved_patch.h"
 #include "agreement/measured.h"
 #include "base/error.h"
 #include "measure/reference.h"
-#include "surface/generate.h"
+#include "scattering/tile.h"
 #include "validation/statistics.h"
 #include "visibility/march.h"
 
@@ -18,22 +17,6 @@ namespace {
 
 constexpr int size = 32;
 
-HeightField relief(const BaseCurvature& base) {
-    HeightField surface = generate_gaussian(size, size, 1, 4, 0.7, 3);
-    surface.base = base;
-    return surface;
-}
-
-// The whole period as patches that are exact: one on a cylinder, small ones on a sphere.
-std::vector<std::unique_ptr<CurvedPatch>> patches_of(const HeightField& surface) {
-    const int core = surface.base.kappa_2 == 0 ? size : size / 4, margin = 72;
-    std::vector<std::unique_ptr<CurvedPatch>> patches;
-    for (int y = 0; y < size; y += core)
-        for (int x = 0; x < size; x += core)
-            patches.push_back(std::make_unique<CurvedPatch>(surface, x, y, core, margin));
-    return patches;
-}
-
 struct BaseCase {
     const char* name;
     BaseCurvature base;
@@ -41,9 +24,31 @@ struct BaseCase {
 
 class CurvedBase : public ::testing::TestWithParam<BaseCase> {};
 
+TEST_P(CurvedBase, FacetsAreThoseOfTheDisplacedMesh) {
+    const HeightField surface = relief_on(GetParam().base);
+    const Tile tile = make_tile(surface, {0, 0, size, size}, {0, 0, size, size}, 1);
+    const auto patches = patches_of(surface);
+    const CurvedPatch& patch = *patches[0];  // of the corner of the surface
+    // Exact for cylinders; patches of spheres are seen from their middle, 6 cells away at most.
+    const double kappa = std::abs(surface.base.kappa_1),
+                 right = surface.base.kappa_2 == 0 ? 2e-6 : kappa * kappa * 20;
+    for (int j = 0; j < patch.core(); ++j)
+        for (int i = 0; i < patch.core(); ++i)
+            for (int kind = 0; kind < 2; ++kind) {
+                const FacetPoint middle = facet_point(kind, 2.0 / 3, 1.0 / 3);
+                const CurvedPatch::Point p = patch.point(i, j, kind, middle.u, middle.v);
+                const Vec3 normal = turned_direction(p.normal, surface.base, p.x, p.y);
+                const size_t slot = tile.slot(kind, j, i);
+                EXPECT_NEAR(2 * std::pow(tile.sqrt_area[slot], 2) / p.area, 1, right);
+                EXPECT_NEAR(tile.normal_x[slot], normal.x, right);
+                EXPECT_NEAR(tile.normal_y[slot], normal.y, right);
+                EXPECT_NEAR(tile.normal_z[slot], normal.z, right);
+            }
+}
+
 // Which points are lit, ray by ray.
 TEST_P(CurvedBase, LitMasks) {
-    const HeightField surface = relief(GetParam().base);
+    const HeightField surface = relief_on(GetParam().base);
     const MarchGrid grid = make_march_grid(surface);
     const auto patches = patches_of(surface);
     long long rays = 0, wrong = 0, dark = 0;
@@ -53,7 +58,7 @@ TEST_P(CurvedBase, LitMasks) {
             const FacetPoint start = facet_point(kind, 0.41, 0.77);
             const Vec3 d = to_vector(light);
             std::vector<uint32_t> visible(size);
-            march_visible(grid, make_ray_bundle(grid, d, start, 3000), {0, 0, size, size}, visible.data());
+            visible_along(grid, d, start, 3000, {0, 0, size, size}, visible.data());
             for (size_t k = 0; k < patches.size(); ++k) {
                 const CurvedPatch& patch = *patches[k];
                 const int n = patch.core(), x0 = static_cast<int>(k) % (size / n) * n,
@@ -76,12 +81,12 @@ TEST_P(CurvedBase, LitMasks) {
 }
 
 TEST_P(CurvedBase, OrdersOfScattering) {
-    const HeightField surface = relief(GetParam().base);
+    const HeightField surface = relief_on(GetParam().base);
     const auto owned = patches_of(surface);
     std::vector<CurvedPatch*> patches;
     for (const auto& p : owned) patches.push_back(p.get());
     constexpr double albedo = 0.8;
-    constexpr int orders = 3, paths = 200000;
+    constexpr int orders = 3, paths = 600000;
     const std::vector<AnglesDeg> lights{{0, 0}, {40, 70}, {65, 180}, {80, 310}},
         views{{5, 0}, {50, 20}, {75, 200}};
     BrdfPlan apart = plan_for_target(lights, views, 0.004);
@@ -128,16 +133,16 @@ INSTANTIATE_TEST_SUITE_P(Bases, CurvedBase,
                          });
 
 // The papers' way: horizons corrected, directions moved. It takes for granted that what sees each other does
-// so on any base, so only gentle bases are for it. There shadows are right to a thousandth; of what bending
-// does to indirect light it gets about half (fans add 3 % to that), for the rest is what bending hides and
-// shows.
+// so on any base, so only gentle bases are for it. There shadows are right to a hundredth of what bending does
+// to them; of what it does to indirect light two thirds are found (without the horizon's shift half of that),
+// the rest is what bending hides and shows inside the relief.
 TEST(CorrectedHorizons, AgreeOnGentleBases) {
     const std::vector<AnglesDeg> lights{{0, 0}, {40, 70}, {65, 180}, {75, 310}},
         views{{5, 0}, {50, 20}, {70, 200}};
     BrdfPlan plan = plan_for_target(lights, views, 0.004);
     plan.max_order = 2;
     plan.separate_orders = true;
-    auto table = [&](const BaseCurvature& base) { return measure(relief(base), gray({1}), plan).table; };
+    auto table = [&](const BaseCurvature& base) { return measure(relief_on(base), gray({1}), plan).table; };
     auto off = [&](const Table& a, const Table& b, size_t order) {
         double squares = 0;
         for (size_t row = 0; row < a.rows(); ++row)
@@ -150,7 +155,9 @@ TEST(CorrectedHorizons, AgreeOnGentleBases) {
         base.correction = correction;
         const Table papers = table(base);
         for (const size_t order : {1u, 2u}) {
-            EXPECT_LT(off(papers, truth, order), (order == 1 ? 0.05 : 0.65) * off(flat, truth, order));
+            std::printf("order %zu: off by %.4f, flat by %.4f\n", order, off(papers, truth, order),
+                        off(flat, truth, order));
+            EXPECT_LT(off(papers, truth, order), (order == 1 ? 0.05 : 0.4) * off(flat, truth, order));
         }
     }
 }
@@ -165,23 +172,23 @@ TEST(CurvedBaseRefuses, WhatItCannotDo) {
         }
         return std::string("nothing");
     };
-    const HeightField bent = relief({0.01, 0, 0});
+    const HeightField bent = relief_on({0.01, 0, 0});
     EXPECT_EQ(field([&] { measure_reference(bent, gray({0.5}), plan, {16}, {}); }), "/base");
     EXPECT_EQ(field([&] { measure_brdf(bent, Material({"y"}, Phong{10.0, 0.5}), plan, {}); }), "/base");
     // The relief is about 3 cells high and deep.
-    EXPECT_EQ(field([&] { measure_brdf(relief({0, 0.24, 0}), gray({0.5}), plan, {}); }), "/base/kappa_2");
-    EXPECT_EQ(field([&] { measure_brdf(relief({-0.24, 0, 0}), gray({0.5}), plan, {}); }), "/base/kappa_1");
+    EXPECT_EQ(field([&] { measure_brdf(relief_on({0, 0.24, 0}), gray({0.5}), plan, {}); }), "/base/kappa_2");
+    EXPECT_EQ(field([&] { measure_brdf(relief_on({-0.24, 0, 0}), gray({0.5}), plan, {}); }), "/base/kappa_1");
 }
 
 TEST(FlatBase, KappaZeroIsTheFlatEngine) {
-    const HeightField flat = relief({});
+    const HeightField flat = relief_on({});
     const BrdfPlan plan = plan_for_target({{30, 0}, {70, 90}}, {{0, 0}, {60, 200}}, 0.01);
     const Table a = measure(flat, gray({0.7}), plan).table,
-                b = measure(relief({0, 0, 0.3}), gray({0.7}), plan).table;
+                b = measure(relief_on({0, 0, 0.3}), gray({0.7}), plan).table;
     EXPECT_EQ(a.f, b.f);
     EXPECT_EQ(a.se, b.se);
     // And the limit is there: a radius of 10^6 cells turns nothing.
-    const Table c = measure(relief({1e-6, 1e-6, 0}), gray({0.7}), plan).table;
+    const Table c = measure(relief_on({1e-6, 1e-6, 0}), gray({0.7}), plan).table;
     expect_tables_agree(a, c, 4);
 }
 

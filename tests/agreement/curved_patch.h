@@ -8,11 +8,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "base/random.h"
+#include "surface/generate.h"
 #include "surface/height_field.h"
 #include "visibility/curvature.h"
+#include "visibility/view_map.h"
 
 namespace gonio {
 
@@ -77,6 +81,7 @@ class CurvedPatch {
         Vec3 position, normal;
         double area = 1;      // of its facet, over that of the base
         double x = 0, y = 0;  // on the base
+        size_t facet = 0;     // that a ray hit, as facet_index()
         // A direction told in the frame of the base there, in space.
         Vec3 in_space(const Vec3& local, const BaseCurvature& base) const {
             return turned_direction(local, base, -x, -y);
@@ -93,6 +98,15 @@ class CurvedPatch {
         p.x = base_x(i + margin_) + u * s_.pitch_x;
         p.y = base_y(j + margin_) + v * s_.pitch_y;
         return p;
+    }
+
+    // What is seen at (x, y), in cells of the core, of the base from far away: a ray towards `view`, told in
+    // the frame there, that passes that place of the plane z = 0 of the surface as given. Not in a hollow.
+    bool see(double x, double y, const Vec3& view, Point* hit) const {
+        const double base_x = (x - 0.5 * core_) * s_.pitch_x, base_y = (y - 0.5 * core_) * s_.pitch_y;
+        const Vec3 w = turned_direction(view, s_.base, -base_x, -base_y);
+        const Vec3 from = displaced(base_x, base_y, -s_.mean_height) + (2 * top_ / view.z) * w;
+        return trace(from, -1 * w, hit);
     }
 
     // The first facet from `origin` along `direction`, or nothing. Its position and normal only.
@@ -115,6 +129,9 @@ class CurvedPatch {
             return false;
         *hit = on_facet(static_cast<int>(ray.hit.primID));
         hit->position = origin + (static_cast<double>(ray.ray.tfar) * direction);
+        const int cell = static_cast<int>(ray.hit.primID) / 2;
+        hit->facet = facet_index(s_.nx, s_.ny, 0, static_cast<int>(ray.hit.primID) % 2,
+                                 wrap_index(y0_ + cell / n_, s_.ny), wrap_index(x0_ + cell % n_, s_.nx));
         return true;
     }
     int core() const { return core_; }
@@ -172,6 +189,22 @@ class CurvedPatch {
     RTCScene scene_ = nullptr;
 };
 
+// The relief of the tests and its whole period as patches that are exact: one on a cylinder, small ones on a
+// sphere.
+inline HeightField relief_on(const BaseCurvature& base, int size = 32) {
+    HeightField surface = generate_gaussian(size, size, 1, 4, 0.7, 3);
+    surface.base = base;
+    return surface;
+}
+inline std::vector<std::unique_ptr<CurvedPatch>> patches_of(const HeightField& surface) {
+    const int size = surface.nx, core = surface.base.kappa_2 == 0 ? size : size / 4, margin = 72;
+    std::vector<std::unique_ptr<CurvedPatch>> patches;
+    for (int y = 0; y < size; y += core)
+        for (int x = 0; x < size; x += core)
+            patches.push_back(std::make_unique<CurvedPatch>(surface, x, y, core, margin));
+    return patches;
+}
+
 // Lambertian f of orders 1 .. n_orders each, and of all orders, at albedo 1 but for `all`.
 struct TracedOrders {
     struct Value {
@@ -182,9 +215,10 @@ struct TracedOrders {
 };
 
 // One view, every light; paths start at random points of the cores. patches: equal shares of the surface.
+// Without a view: exitance, over the irradiance of the base, as the mean over facets, all of equal weight.
 inline std::vector<TracedOrders> trace_view(const std::vector<CurvedPatch*>& patches,
-                                            const std::vector<Vec3>& lights, const Vec3& view, int n_orders,
-                                            double albedo, int paths, uint64_t seed) {
+                                            const std::vector<Vec3>& lights, const std::optional<Vec3>& view,
+                                            int n_orders, double albedo, int paths, uint64_t seed) {
     constexpr int longest = 24;
     const size_t n_lights = lights.size();
     std::vector<std::vector<double>> sum(n_lights, std::vector<double>(n_orders + 1)), squares = sum;
@@ -200,10 +234,13 @@ inline std::vector<TracedOrders> trace_view(const std::vector<CurvedPatch*>& pat
         const int kind = random(path, 0, 3) < 0.5 ? 0 : 1;
         if ((kind == 0) != (u >= v)) std::swap(u, v);
         CurvedPatch::Point p = patch.point(cell % patch.core(), cell / patch.core(), kind, u, v);
-        const Vec3 wo = p.in_space(view, patch.base());
         CurvedPatch::Point hit;
-        const double start = p.area * dot(p.normal, wo) / (pi * view.z);
-        if (!(start > 0) || patch.trace(p.position, wo, &hit)) continue;
+        double start = 1;
+        if (view) {
+            const Vec3 wo = p.in_space(*view, patch.base());
+            start = p.area * dot(p.normal, wo) / (pi * view->z);
+            if (!(start > 0) || patch.trace(p.position, wo, &hit)) continue;
+        }
         std::vector<Vec3> wi;
         for (const Vec3& light : lights) wi.push_back(p.in_space(light, patch.base()));
         std::vector<std::vector<double>> found(n_lights, std::vector<double>(n_orders + 1));

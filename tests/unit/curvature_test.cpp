@@ -74,22 +74,39 @@ TEST(BaseCurvature, PositionsAreThoseOfSphereAndCylinder) {
     EXPECT_NEAR(exact.z, -0.002 * 36 / 2, 1e-6);
 }
 
-TEST(BaseCurvature, StretchesFacetsAsTheDisplacedSurface) {
-    const Gradient g{0.4, -0.7};
-    const double h = 1.5, step = 1e-5;
-    for (const double direction : {0.0, 0.6})
-        for (const double kappa : {0.1, -0.1}) {
-            const Cylinder cylinder{kappa, direction};
-            auto at = [&](double x, double y) { return cylinder.position(x, y, h + g.x * x + g.y * y); };
-            const Vec3 a = minus(at(step, 0), at(-step, 0)), b = minus(at(0, step), at(0, -step));
-            const Vec3 n = cross(a, b);
-            const StretchedFacet facet = stretched(cylinder.base(), h, g);
-            EXPECT_NEAR(facet.gradient.x, -n.x / n.z, 1e-7);
-            EXPECT_NEAR(facet.gradient.y, -n.y / n.z, 1e-7);
-            EXPECT_NEAR(facet.stretch * area_ratio(facet.gradient), std::sqrt(dot(n, n)) / (4 * step * step),
-                        1e-7);
-        }
-    EXPECT_NEAR(stretched({0.1, 0.2, 1}, h, g).stretch, 1.15 * 1.3, 1e-12);
+// Flat triangles between displaced nodes: exactly so on a cylinder, in the frame at the centroid; and
+// together they are the displaced surface, whose parallel areas grow by I + h K.
+TEST(BaseCurvature, FacetsAreThoseOfTheDisplacedMesh) {
+    for (const double kappa : {0.02, -0.02}) {
+        HeightField surface = generate_gaussian(16, 16, 1, 4, 0.7, 4);
+        surface.base = {kappa, 0, 0};
+        const Cylinder cylinder{kappa, 0};
+        double area = 0, expected = 0;
+        for (int j = 0; j < 16; ++j)
+            for (int i = 0; i < 16; ++i)
+                for (int kind = 0; kind < 2; ++kind) {
+                    const double x = kind == 0 ? 2.0 / 3 : 1.0 / 3, y = 1 - x;
+                    auto node = [&](int a, int b) {
+                        return cylinder.position(a - x, b - y, surface.at(i + a, j + b));
+                    };
+                    const Vec3 a = minus(node(1, 1), node(0, 0)),
+                               b = kind == 0 ? minus(node(1, 0), node(0, 0)) : minus(node(0, 1), node(0, 0));
+                    const Vec3 n = kind == 0 ? cross(b, a) : cross(a, b);
+                    const double length = std::sqrt(dot(n, n));
+                    const DisplacedFacet facet = displaced_facet(surface, kind, i, j);
+                    EXPECT_NEAR(facet.area / (0.5 * length), 1, 1e-9);
+                    expect_near(facet.normal, {n.x / length, n.y / length, n.z / length}, 1e-9);
+                    const Gradient g = facet_gradient(surface, kind, i, j);
+                    const double stretch =
+                        1 + kappa *
+                                (surface.at(i, j) + surface.at(i + 1, j + 1) +
+                                 (kind == 0 ? surface.at(i + 1, j) : surface.at(i, j + 1))) /
+                                3.0;
+                    area += facet.area;
+                    expected += 0.5 * stretch * area_ratio({g.x / stretch, g.y});
+                }
+        EXPECT_NEAR(area / expected, 1, 2e-4);
+    }
 }
 
 TEST(BaseCurvature, TurnsDirectionsWithTheNormal) {
@@ -154,15 +171,26 @@ class ArcWalk {
         for (const float h : surface.heights) top_ = std::max<double>(top_, h);
     }
 
-    // tolerance: a ray that is deeper below the relief than that need not be followed further.
-    Walk trace(int column, int row, const FacetPoint& start, const Vec3& d, double tolerance) const {
+    double start_height(int column, int row, const FacetPoint& start) const {
+        return height(start.kind, column, row, (column + start.u) * s_.pitch_x, (row + start.v) * s_.pitch_y);
+    }
+
+    // tolerance: a ray that is deeper below the relief than that need not be followed further. typical: of
+    // the start heights, which decides how the way drifts across d.
+    Walk trace(int column, int row, const FacetPoint& start, const Vec3& d, double tolerance,
+               double typical) const {
         const double horizontal = std::hypot(d.x, d.y), ux = d.x / horizontal, uy = d.y / horizontal,
                      slope = d.z / horizontal, kappa = s_.base.along(ux, uy);
         const double x0 = (column + start.u) * s_.pitch_x, y0 = (row + start.v) * s_.pitch_y;
         const double h0 = height(start.kind, column, row, x0, y0);
+        // A point of height h at base offset p stands h K p away from its foot, whose part across d the ray
+        // cannot have.
+        const BaseCurvature::Tensor k = s_.base.tensor();
+        const double across = -(-uy * (k.xx * ux + k.xy * uy) + ux * (k.xy * ux + k.yy * uy));
         const Gradient g = facet_gradient(s_, start.kind, column, row);
         Walk walk;
-        const double facing = slope * (1 + kappa * h0) - (g.x * ux + g.y * uy);
+        const double facing = slope * (1 + kappa * h0) -
+                              (g.x * (ux - uy * across * typical) + g.y * (uy + ux * across * typical));
         walk.front = facing > 0;
         walk.clearance = std::abs(facing);
         if (!walk.front) return walk;
@@ -170,7 +198,8 @@ class ArcWalk {
         const double quarter_turn = kappa == 0 ? 1e300 : pi / 2 / std::abs(kappa);
         double lowest = 1e300;  // of the ray above the relief
         for (double distance = step; distance < std::min(quarter_turn, 400.0); distance += step) {
-            const double x = x0 + distance * ux, y = y0 + distance * uy;
+            const double drift = across * distance * (typical + slope * distance),
+                         x = x0 + distance * ux - drift * uy, y = y0 + distance * uy + drift * ux;
             const int i = static_cast<int>(std::floor(x / s_.pitch_x)),
                       j = static_cast<int>(std::floor(y / s_.pitch_y));
             const int kind = x / s_.pitch_x - i >= y / s_.pitch_y - j ? 0 : 1;
@@ -220,42 +249,50 @@ TEST_P(BentMarch, EqualsAWalkAlongTruePositions) {
     const double kappa = std::max(std::abs(surface.base.kappa_1), std::abs(surface.base.kappa_2));
     const double sagitta = kappa * std::pow(std::max(1.0, surface.pitch_y), 2) / 4 + 0.01;
     int rays = 0, decided = 0, hits = 0, wrong = 0, other_facet = 0, n = 0;
+    size_t most_layers = 0;
     for (const double elevation_deg : {-20.0, -4.0, 1.0, 5.0, 15.0, 35.0})
         for (const double phi_deg : {0.0, 25.0, 70.0, 90.0, 131.0, 180.0, 222.0, 301.0}) {
             const Vec3 d = to_vector({90 - elevation_deg, phi_deg});
             const FacetPoint start = facet_point(n % 2, fractional_part(0.37 * n), fractional_part(0.71 * n));
             ++n;
-            const RayBundle bundle = make_ray_bundle(grid, d, start, 3000);
             const CellRect whole{0, 0, surface.nx, surface.ny};
             std::vector<uint32_t> visible(static_cast<size_t>(words_for(surface.nx)) * surface.ny);
-            march_visible(grid, bundle, whole, visible.data());
-            const int width = bundle.transposed ? surface.ny : surface.nx,
-                      lines = bundle.transposed ? surface.nx : surface.ny;
-            HitLines found;
-            march_hits(grid, bundle, 0, 0, width, lines, found);
-            for (int k = n % 13; k < surface.nx * surface.ny; k += 13) {
-                const int i = k % surface.nx, j = k / surface.nx;
-                const Walk expected = walk.trace(i, j, start, d, sagitta);
-                ++rays;
-                if (expected.clearance < sagitta) continue;
-                ++decided;
-                const int place = bundle.transposed ? j : i, line = bundle.transposed ? i : j;
-                const size_t word = static_cast<size_t>(line) * words_for(width) + place / 32;
-                const bool hit = found.hit[word] >> (place % 32) & 1;
-                const bool sees =
-                    visible[static_cast<size_t>(j) * words_for(surface.nx) + i / 32] >> (i % 32) & 1;
-                wrong += hit != expected.hit || sees != (expected.front && !expected.hit);
-                if (!hit || !expected.hit) continue;
-                ++hits;
-                const CrossedFacet& facet = bundle.facets[found.crossing[word * 32 + place % 32]];
-                other_facet += i + (bundle.transposed ? facet.row : facet.column) != expected.column ||
-                               j + (bundle.transposed ? facet.column : facet.row) != expected.row;
+            visible_along(grid, d, start, 3000, whole, visible.data());
+            const std::vector<StartHeights> layers = start_heights(grid, d);
+            most_layers = std::max(most_layers, layers.size());
+            for (const StartHeights& layer : layers) {
+                const RayBundle bundle = make_ray_bundle(grid, d, start, 3000, layer);
+                const int width = bundle.transposed ? surface.ny : surface.nx,
+                          lines = bundle.transposed ? surface.nx : surface.ny;
+                HitLines found;
+                march_hits(grid, bundle, 0, 0, width, lines, found);
+                for (int k = n % 13; k < surface.nx * surface.ny; k += 13) {
+                    const int i = k % surface.nx, j = k / surface.nx;
+                    const double height = walk.start_height(i, j, start);
+                    if (height < layer.from + 1e-4 || height > layer.below - 1e-4) continue;
+                    const Walk expected = walk.trace(i, j, start, d, sagitta, layer.typical);
+                    ++rays;
+                    if (expected.clearance < sagitta) continue;
+                    ++decided;
+                    const int place = bundle.transposed ? j : i, line = bundle.transposed ? i : j;
+                    const size_t word = static_cast<size_t>(line) * words_for(width) + place / 32;
+                    const bool hit = found.hit[word] >> (place % 32) & 1;
+                    const bool sees =
+                        visible[static_cast<size_t>(j) * words_for(surface.nx) + i / 32] >> (i % 32) & 1;
+                    wrong += hit != expected.hit || sees != (expected.front && !expected.hit);
+                    if (!hit || !expected.hit) continue;
+                    ++hits;
+                    const CrossedFacet& facet = bundle.facets[found.crossing[word * 32 + place % 32]];
+                    other_facet += i + (bundle.transposed ? facet.row : facet.column) != expected.column ||
+                                   j + (bundle.transposed ? facet.column : facet.row) != expected.row;
+                }
             }
         }
     EXPECT_EQ(wrong, 0);
     EXPECT_LT(other_facet, hits / 50) << "where the ray meets an edge";
     EXPECT_GT(hits, rays / 10);
     EXPECT_GT(decided, rays * 3 / 4);
+    EXPECT_EQ(most_layers > 1, !surface.base.is_round());
 }
 
 INSTANTIATE_TEST_SUITE_P(Bases, BentMarch,

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "scattering/turned_radiosity.h"
 #include "surface/generate.h"
 #include "visibility/curvature.h"
 
@@ -106,6 +107,50 @@ TEST_P(TurnedLightOn, IsCarriedLinkByLink) {
         for (size_t k = 0; k < expected.size(); ++k)
             ASSERT_NEAR(value(carried, k, a, b), expected[k], 1e-5 + 1e-5 * std::abs(expected[k])) << k;
     }
+}
+
+// What facets send back in all: first, second and third order, by two operators in turn.
+TEST_P(TurnedLightOn, IsSummedOverTheOrders) {
+    const TurnedLight light = polynomial();
+    std::array<LinkOperator, 2> operators;
+    for (int k = 0; k < 2; ++k) {
+        const double slope = grid.max_slope;
+        std::vector<SubSample> jitter(16, {0.4, 0.3});
+        operators[k] = build_link_operator(
+            grid, tile, slab_directions(16, slope / std::sqrt(1 + slope * slope), 0.3, 0.2 + 0.4 * k), jitter,
+            1, {});
+    }
+    const TurnedLight second = apply(operators[0], light, 1), third = apply(operators[1], second, 1);
+    // The light here is scaled by sqrt(area) already.
+    TurnedLight per_area = light;
+    std::vector<float> inverse(tile.n_slots());
+    for (size_t k = 0; k < inverse.size(); ++k)
+        inverse[k] = tile.sqrt_area[k] > 0 ? 1 / tile.sqrt_area[k] : 0;
+    for (Fields& f : per_area.coefficients) scale_rows(f, tile, inverse, 1);
+    RadiosityOptions options;
+    options.max_order = 3;
+    FacetAlbedo constant, map;
+    constant.constant = {0.5, 0.8};
+    map.maps = {std::vector<float>(tile.n_slots(), 0.8f)};
+    TurnedRadiosity of_constant, of_map;
+    turned_radiosity(operators, tile, constant, options, per_area, 1, {}, of_constant);
+    turned_radiosity(operators, tile, map, options, per_area, 1, {}, of_map);
+    ASSERT_EQ(of_constant.of_channel.size(), 2u);
+    EXPECT_EQ(of_constant.applications, 2);
+    double turns = 0;
+    for (size_t k = 0; k < light.coefficients[0].values().size(); ++k) {
+        const double root = inverse[k / column_block % tile.n_slots()];
+        auto expected = [&](double a) {
+            return root * a *
+                   (light.coefficients[0].values()[k] + a * second.coefficients[0].values()[k] +
+                    a * a * third.coefficients[0].values()[k]);
+        };
+        ASSERT_NEAR(of_constant.of_channel[0].values()[k], expected(0.5), 2e-5);
+        ASSERT_NEAR(of_constant.of_channel[1].values()[k], expected(0.8), 2e-5);
+        ASSERT_NEAR(of_map.of_channel[0].values()[k], expected(0.8), 2e-5);
+        turns = std::max(turns, std::abs(static_cast<double>(second.coefficients[1].values()[k])));
+    }
+    EXPECT_GT(turns, 0.01);
 }
 
 INSTANTIATE_TEST_SUITE_P(Bases, TurnedLightOn,
