@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "base/half.h"
@@ -13,27 +14,20 @@
 namespace gonio {
 namespace {
 
-// Metres above the mean height.
-double plane_height(const HeightField& s, const BtfPlan& plan) {
-    return plan.plane == BtfPlan::Plane::zero ? -s.mean_height
-                                              : *std::max_element(s.heights.begin(), s.heights.end());
-}
-
 PixelGrid pixel_grid(const HeightField& s, const BtfPlan& plan) {
     PixelGrid pixels;
     pixels.area = {s.border_x, s.border_y, s.nx - 2 * s.border_x, s.ny - 2 * s.border_y};
     pixels.nx = plan.pixels_x > 0 ? plan.pixels_x : pixels.area.width;
     pixels.ny = plan.pixels_y > 0 ? plan.pixels_y : pixels.area.height;
-    pixels.plane_height = plane_height(s, plan);
+    pixels.plane_height = view_plane_height(s, plan);
     return pixels;
 }
 
-// Pairs that mirror each other in the pixel's centre, by the R2 sequence (Roberts 2018), and the centre if
-// they are odd: with whole cells a pixel both kinds of facets are seen equally often from above.
-std::vector<SubSample> pixel_places(int n) {
+// Pairs that mirror each other in the pixel's centre, by the R2 sequence (Roberts 2018), and where that
+// begins if they are odd: with whole cells a pixel both kinds of facets are seen equally often from above.
+std::vector<SubSample> pixel_places(int n, const SubSample& first) {
     std::vector<SubSample> places;
-    const std::vector<SubSample> sequence =
-        shifted_sub_samples(1 + n / 2, 0.5, 0.5);  // begins with the centre
+    const std::vector<SubSample> sequence = shifted_sub_samples(1 + n / 2, first.a, first.b);
     for (int k = 1; k <= n / 2; ++k) {
         places.push_back(sequence[k]);
         places.push_back({1 - sequence[k].a, 1 - sequence[k].b});
@@ -43,6 +37,21 @@ std::vector<SubSample> pixel_places(int n) {
 }
 
 }  // namespace
+
+double view_plane_height(const HeightField& s, const BtfPlan& plan) {
+    return plan.plane == BtfPlan::Plane::zero ? -s.mean_height
+                                              : *std::max_element(s.heights.begin(), s.heights.end());
+}
+
+Vec3 pixel_to_camera(const HeightField& s, double plane_height, const Vec3& camera, const BtfShape& shape,
+                     size_t pixel) {
+    const int i = static_cast<int>(pixel % shape.pixels_x), j = static_cast<int>(pixel / shape.pixels_x);
+    const double x = s.border_x + (i + 0.5) * (s.nx - 2.0 * s.border_x) / shape.pixels_x,
+                 y = s.border_y + (j + 0.5) * (s.ny - 2.0 * s.border_y) / shape.pixels_y;
+    const Vec3 d{camera.x - x * s.pitch_x, camera.y - y * s.pitch_y, camera.z - plane_height};
+    const double length = std::sqrt(dot(d, d));
+    return {d.x / length, d.y / length, d.z / length};
+}
 
 BtfShape btf_shape(const HeightField& s, const Material& material, const BtfPlan& plan, int refinement) {
     return {plan.cameras ? plan.cameras->n_u * plan.cameras->n_v : static_cast<int>(plan.outgoing.size()),
@@ -72,16 +81,19 @@ std::vector<Vec3> camera_places(const HeightField& s, const BtfPlan& plan) {
         for (int u = 0; u < cameras.n_u; ++u)
             places.push_back({0.5 * s.width() + ((u + 0.5) / cameras.n_u - 0.5) * cameras.width,
                               0.5 * s.depth() + ((v + 0.5) / cameras.n_v - 0.5) * cameras.depth,
-                              plane_height(s, plan) + cameras.height});
+                              view_plane_height(s, plan) + cameras.height});
     return places;
 }
 
 std::vector<uint32_t> make_view_maps(const HeightField& surface, const MarchGrid& grid, const BtfPlan& plan,
-                                     const BtfShape& shape, int refinement, int n_threads,
+                                     const BtfShape& shape, const std::vector<int>& views,
+                                     const SubSample& place, int refinement, int n_threads,
                                      const Monitor& monitor, double& unresolved) {
     const PixelGrid pixels = pixel_grid(surface, plan);
     std::vector<Vec3> cameras, directions;
+    std::optional<TraceGrid> trace_grid;
     if (plan.cameras) {
+        trace_grid = make_trace_grid(surface);
         cameras = camera_places(surface, plan);
         if (!(cameras[0].z > grid.highest * grid.pitch_x))
             throw Error(ErrorCode::invalid_input, "/measure/cameras/height",
@@ -90,16 +102,16 @@ std::vector<uint32_t> make_view_maps(const HeightField& surface, const MarchGrid
     } else {
         for (const AnglesDeg& view : plan.outgoing) directions.push_back(to_vector(view));
     }
-    std::vector<uint32_t> maps(shape.maps_size());
-    const std::vector<SubSample> places = pixel_places(shape.pixel_samples);
-    std::vector<long long> given_up(static_cast<size_t>(shape.n_views) * shape.pixel_samples);
+    std::vector<uint32_t> maps(views.size() * shape.pixel_samples * shape.n_pixels());
+    const std::vector<SubSample> places = pixel_places(shape.pixel_samples, place);
+    std::vector<long long> given_up(views.size() * shape.pixel_samples);
     parallel_for(static_cast<int>(given_up.size()), n_threads, [&](int task) {
         monitor.check_cancelled();
-        const SubSample& place = places[task % shape.pixel_samples];
-        const int view = task / shape.pixel_samples;
-        const ViewMap map = plan.cameras
-                                ? make_camera_map(grid, cameras[view], pixels, place.a, place.b, refinement)
-                                : make_view_map(grid, directions[view], pixels, place.a, place.b, refinement);
+        const auto [a, b] = places[task % shape.pixel_samples];
+        const int view = views[task / shape.pixel_samples];
+        const ViewMap map =
+            plan.cameras ? make_camera_map(*trace_grid, surface, cameras[view], pixels, a, b, refinement)
+                         : make_view_map(grid, directions[view], pixels, a, b, refinement);
         std::copy(map.facet.begin(), map.facet.end(),
                   maps.begin() + static_cast<long>(task * shape.n_pixels()));
         given_up[task] = map.unresolved;
@@ -110,24 +122,29 @@ std::vector<uint32_t> make_view_maps(const HeightField& surface, const MarchGrid
 
 void expand_view(const BtfShape& shape, std::span<const uint16_t> radiance,
                  std::span<const uint32_t> view_maps, int view, std::span<uint16_t> out) {
+    constexpr size_t chunk = 4096;  // pixels: their part of the map stays in the cache over all images
     const size_t n = shape.n_pixels();
     const uint32_t* map = view_maps.data() + static_cast<size_t>(view) * shape.pixel_samples * n;
     const float share = 1.0f / static_cast<float>(shape.pixel_samples);
-    for (int l = 0; l < shape.n_lights; ++l)
-        for (int c = 0; c < shape.n_channels; ++c) {
-            const uint16_t* plane =
-                radiance.data() + (static_cast<size_t>(c) * shape.n_lights + l) * shape.n_facets;
-            uint16_t* image = out.data() + (static_cast<size_t>(l) * shape.n_channels + c) * n;
-            if (shape.pixel_samples == 1) {
-                for (size_t p = 0; p < n; ++p) image[p] = plane[map[p]];
-                continue;
+    for (size_t first = 0; first < n; first += chunk) {
+        const size_t end = std::min(n, first + chunk);
+        for (int l = 0; l < shape.n_lights; ++l)
+            for (int c = 0; c < shape.n_channels; ++c) {
+                const uint16_t* plane =
+                    radiance.data() + (static_cast<size_t>(c) * shape.n_lights + l) * shape.n_facets;
+                uint16_t* image = out.data() + (static_cast<size_t>(l) * shape.n_channels + c) * n;
+                if (shape.pixel_samples == 1) {
+                    for (size_t p = first; p < end; ++p) image[p] = plane[map[p]];
+                    continue;
+                }
+                for (size_t p = first; p < end; ++p) {
+                    float sum = 0;
+                    for (int s = 0; s < shape.pixel_samples; ++s)
+                        sum += from_half_bits(plane[map[s * n + p]]);
+                    image[p] = half_bits(share * sum);
+                }
             }
-            for (size_t p = 0; p < n; ++p) {
-                float sum = 0;
-                for (int s = 0; s < shape.pixel_samples; ++s) sum += from_half_bits(plane[map[s * n + p]]);
-                image[p] = half_bits(share * sum);
-            }
-        }
+    }
 }
 
 }  // namespace gonio

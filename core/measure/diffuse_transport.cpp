@@ -4,6 +4,7 @@
 #include <cmath>
 #include <tuple>
 
+#include "measure/cell_views.h"
 #include "measure/describe.h"
 #include "measure/shard_bytes.h"
 #include "measure/windows.h"
@@ -73,13 +74,15 @@ double DiffuseTransport::least_bytes(const RunSettings& settings) const {
 }
 
 double DiffuseTransport::wanted_bytes(const RunSettings& settings) const {
-    const int n_views = context_.view_to_light.empty() ? static_cast<int>(context_.views.size()) : 0;
+    const int n_views = context_.view_to_light.empty() ? views_of_run(context_, settings) : 0;
     return run_bytes(context_, settings, static_cast<int>(context_.lights.size()), n_views);
 }
 
 RunValues DiffuseTransport::run(const RunSettings& settings, int stage, int run, int n_threads,
                                 const Monitor& monitor) const {
-    return run_once(context_, settings, stage, run, n_threads, monitor);
+    return run_with_cells(context_, settings, stage, run, [&](const RunContext& context) {
+        return run_once(context, settings, stage, run, n_threads, monitor);
+    });
 }
 
 std::string DiffuseTransport::settings_key(const RunSettings& settings) const {
@@ -100,7 +103,9 @@ void DiffuseTransport::begin_stage(const Stage& stage, int n_runs) {
     const int kept_columns = context_.view_to_light.empty() ? std::min(n_lights, n_views) : n_lights;
     const double kept_bytes = 4.0 * 2 * n_runs * kept_columns * context_.surface->nx * context_.surface->ny *
                               std::pow(stage.settings.refinement, 2);
-    context_.keep_first = context_.transports() && stage.f.count() == 0 && stage.settings.tiles_x == 0 &&
+    // Not of cells, whose directions are others in every run.
+    context_.keep_first = context_.plan->outgoing_cells.empty() && context_.transports() &&
+                          stage.f.count() == 0 && stage.settings.tiles_x == 0 &&
                           kept_bytes < 0.25 * static_cast<double>(context_.max_bytes);
 }
 

@@ -6,26 +6,48 @@
 #include "base/random.h"
 #include "directions/direction_set.h"
 #include "measure/run.h"
+#include "visibility/curvature.h"
 #include "visibility/march.h"
 
 namespace gonio {
 namespace {
 
-Parameter channel_albedos(const Material& material) {
+FacetAlbedo facet_albedo(const HeightField& surface, const Material& material, const Tile& tile) {
     const Lambertian* lambertian = pure_lambertian(material);
     if (!lambertian)
         throw Error(ErrorCode::invalid_input, "/material", "",
-                    "pictures are measured of Lambertian facets so far");
-    return lambertian->albedo.for_channels(material.channels.size());
+                    "needs Lambertian facets: what others send back depends on the view");
+    const Parameter albedo = lambertian->albedo.for_channels(material.channels.size());
+    FacetAlbedo facets;
+    if (!albedo.is_map()) {
+        facets.constant = albedo.constant;
+        return facets;
+    }
+    for (size_t c = 0; c < albedo.n_channels(); ++c) {
+        std::vector<float>& map = facets.maps.emplace_back(tile.n_slots(), 0.0f);
+        for (int kind = 0; kind < 2; ++kind)
+            for (int j = 0; j < surface.ny; ++j)
+                for (int i = 0; i < surface.nx; ++i)
+                    map[tile.slot(kind, j, i)] = static_cast<float>(albedo.at(c, i, j));
+    }
+    return facets;
 }
 
-ChannelFactors sqrt_albedos(const Tile& tile, const Parameter& albedo, size_t channel) {
-    ChannelFactors factors(tile.n_slots(), 0.0f);
-    for (int kind = 0; kind < 2; ++kind)
-        for (int j = 0; j < tile.ny; ++j)
-            for (int i = 0; i < tile.nx; ++i)
-                factors[tile.slot(kind, j, i)] = static_cast<float>(std::sqrt(albedo.at(channel, i, j)));
-    return factors;
+Tile whole_period(const HeightField& surface, int refinement) {
+    check_base(surface);
+    const CellRect all{0, 0, surface.nx, surface.ny};
+    return make_tile(surface, all, all, refinement);
+}
+
+Tile with_areas_of_1(Tile tile) {
+    tile.sqrt_area.assign(tile.n_slots(), 1.0f);
+    return tile;
+}
+
+RadiosityOptions series(int max_order) {
+    RadiosityOptions options;
+    options.max_order = max_order;
+    return options;
 }
 
 }  // namespace
@@ -34,21 +56,17 @@ FacetLight::FacetLight(const HeightField& surface, const Material& material, int
                        const Accuracy::Samples& samples, uint64_t seed, const RunOptions& options,
                        const Monitor& monitor)
     : surface_(surface),
-      albedo_(channel_albedos(material)),
-      max_order_(max_order),
       samples_(samples),
       seed_(seed),
       options_(options),
       monitor_(monitor),
-      grid_(make_march_grid(surface)) {
-    if (surface.base.is_curved())
-        throw Error(ErrorCode::invalid_input, "/base", "", "pictures are measured on a flat base so far");
-    const CellRect all{0, 0, surface.nx, surface.ny};
-    tile_ = make_tile(surface, all, all, samples.refinement);
-    for (size_t c = 0; albedo_.is_map() && c < albedo_.n_channels(); ++c)
-        maps_.push_back(sqrt_albedos(tile_, albedo_, c));
-    indirect_ = max_order != 1 && grid_.max_slope > 0;
-}
+      grid_(make_march_grid(surface)),
+      tile_(whole_period(surface, samples.refinement)),
+      unit_tile_(with_areas_of_1(tile_)),
+      radiosity_(tile_, facet_albedo(surface, material, tile_), series(max_order), options.n_threads,
+                 monitor),
+      indirect_(max_order != 1 && grid_.max_slope > 0),
+      twice_(max_order == 0 || max_order > 2) {}
 
 void FacetLight::start_run(int run) {
     const auto shift = [&](int which) {
@@ -57,39 +75,53 @@ void FacetLight::start_run(int run) {
     places_ = shifted_sub_samples(samples_.sub_samples, shift(2), shift(3));
     if (!indirect_) return;
     const double slope = grid_.max_slope, z_max = slope / std::sqrt(1 + slope * slope);
-    op_ = build_link_operator(grid_, tile_, slab_directions(samples_.directions, z_max, shift(4), shift(5)),
-                              shifted_sub_samples(samples_.directions, shift(6), shift(7)),
-                              options_.n_threads, monitor_);
-    rays_ += op_.rays;
-    links_ += op_.links;
+    const auto sampled = [&](int directions, int first_shift) {
+        LinkOperator op = build_link_operator(
+            grid_, tile_, slab_directions(directions, z_max, shift(first_shift), shift(first_shift + 1)),
+            shifted_sub_samples(directions, shift(first_shift + 2), shift(first_shift + 3)),
+            options_.n_threads, monitor_);
+        rays_ += op.rays;
+        links_ += op.links;
+        return op;
+    };
+    // A quarter of the directions adds little noise: orders 3 and up are a small part of the light.
+    const int fewer = std::max({samples_.directions / 4, 8, tile_.n_parts()});
+    LinkOperator first = sampled(samples_.directions, 4),
+                 second = twice_ ? sampled(fewer, 8) : LinkOperator();
+    if (surface_.base.is_curved())
+        turning_ = {std::move(first), std::move(second)};
+    else
+        radiosity_.set_operators(
+            {gather_operator(first, tile_), twice_ ? gather_operator(second, tile_) : GatherOperator()});
+}
+
+const std::vector<Fields>& FacetLight::radiosity(const std::vector<Vec3>& lights, const Fields& irradiance) {
+    if (!indirect_ || !surface_.base.is_curved()) return radiosity_.of(irradiance);
+    TurnedLight light = turned_light(grid_, unit_tile_, lights, irradiance, turn_step(turning_[0]), places_,
+                                     options_.allow_skips, options_.n_threads, monitor_);
+    rays_ += light.rays;
+    turned_radiosity(turning_, tile_, radiosity_.albedo(), radiosity_.options(), light, options_.n_threads,
+                     monitor_, turned_);
+    return turned_.of_channel;
 }
 
 LightIrradiance FacetLight::irradiance(const std::vector<Vec3>& lights) {
-    LightIrradiance direct =
-        light_irradiance(grid_, tile_, lights, places_, options_.allow_skips, options_.n_threads, monitor_);
+    LightIrradiance direct = light_irradiance(grid_, unit_tile_, lights, places_, options_.allow_skips,
+                                              options_.n_threads, monitor_);
     rays_ += direct.rays;
     truncated_ += direct.truncated_bundles;
     return direct;
 }
 
-Radiosity FacetLight::radiosity(const Fields& irradiance) {
-    RadiosityOptions series;
-    series.max_order = max_order_;
-    Radiosity radiosity = diffuse_radiosity(indirect_ ? &op_ : nullptr, tile_, irradiance, albedo_.constant,
-                                            maps_, series, options_.n_threads, monitor_);
-    applications_ = std::max(applications_, radiosity.applications);
-    remainder_ = std::max(remainder_, radiosity.remainder);
-    return radiosity;
-}
-
 void FacetLight::describe(int runs, Report& report) const {
-    report.settings = {{"transport", "diffuse operator"},
-                       {"runs", std::to_string(runs)},
-                       {"directions", std::to_string(samples_.directions)},
-                       {"sub_samples", std::to_string(samples_.sub_samples)},
-                       {"refinement", std::to_string(samples_.refinement)},
-                       {"applications", std::to_string(applications_)},
-                       {"simd", simd_target()}};
+    report.settings = {
+        {"transport", "diffuse operator"},
+        {"runs", std::to_string(runs)},
+        {"directions", std::to_string(samples_.directions)},
+        {"sub_samples", std::to_string(samples_.sub_samples)},
+        {"refinement", std::to_string(samples_.refinement)},
+        {"applications", std::to_string(std::max(radiosity_.applications(), turned_.applications))},
+        {"simd", simd_target()}};
     report.counters = {{"rays", rays_}, {"links", links_}, {"truncated_bundles", truncated_}};
 }
 

@@ -27,6 +27,23 @@ double cpu_seconds() {
     return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
+// A cell that no ray, or one, ended in shows no spread, but is not known to be dark. What one ray carries
+// follows from all cells of its light, for counts of rays vary as Poisson's do: variance over mean. That much
+// is added to the standard errors `se` of f, [light][cell].
+void add_doubt_of_one_ray(const double* f, const std::vector<double>& projected_sr, std::vector<double>& se) {
+    const size_t n_cells = projected_sr.size();
+    for (size_t first = 0; first < se.size(); first += n_cells) {
+        double flux = 0, variance = 0;
+        for (size_t cell = 0; cell < n_cells; ++cell) {
+            flux += f[first + cell] * projected_sr[cell];
+            variance += std::pow(se[first + cell] * projected_sr[cell], 2);
+        }
+        if (!(flux > 0)) continue;
+        for (size_t cell = 0; cell < n_cells; ++cell)
+            se[first + cell] = std::hypot(se[first + cell], variance / flux / projected_sr[cell]);
+    }
+}
+
 }  // namespace
 
 ForwardTransport::ForwardTransport(const MeasuredScene& scene)
@@ -145,7 +162,8 @@ Estimate ForwardTransport::estimate(const std::vector<Stage>& stages) const {
     for (size_t s = 0; s < stages.size(); ++s) {
         const double share = weight[s] / all;
         for (size_t slice = 0; slice < n_channels * slices; ++slice) {
-            const std::vector<double> se = standard_errors(stages[s].f, slice * rows, scene_.groups);
+            std::vector<double> se = standard_errors(stages[s].f, slice * rows, scene_.groups);
+            add_doubt_of_one_ray(&stages[s].f.mean()[slice * rows], projected_sr_, se);
             for (size_t r = 0; r < rows; ++r) {
                 const size_t i = slice * rows + r;
                 const double f = stages[s].f.mean()[i];

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "base/error.h"
 #include "directions/gonio_grid.h"
 #include "measure/describe.h"
 #include "measure/facet_light.h"
+#include "measure/glossy_pixels.h"
 
 namespace gonio {
 namespace {
@@ -22,6 +24,11 @@ std::string numbered(const std::string& name, size_t k) {
 
 Accuracy::Samples samples_of(const MapsPlan& plan) {
     return plan.accuracy.samples.value_or(Accuracy::Samples{4, 64, 1, fewest_runs});
+}
+
+// Facets as FacetLight takes them; where they are glossy, it tells lit from shadowed alone.
+Material lambertian_or_black(const Material& material) {
+    return pure_lambertian(material) ? material : Material{material.channels, Lambertian{0.0}};
 }
 
 // The mean of independent runs of one layer, and what they say about its error.
@@ -41,7 +48,14 @@ class Measurement {
           monitor_(monitor),
           n_cells_(static_cast<size_t>(surface.nx) * surface.ny),
           started_(std::chrono::steady_clock::now()),
-          light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor) {}
+          facets_(lambertian_or_black(material)),
+          light_(surface, facets_, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor) {
+        if (pure_lambertian(material)) return;
+        lamps_.incident = plan.incident;
+        lamps_.max_order = plan.max_order;
+        lamps_.accuracy = plan.accuracy;
+        glossy_.emplace(surface, material, lamps_, samples_of(plan), options, monitor);
+    }
 
     MapsResult run() {
         while (wants_more()) {
@@ -52,6 +66,7 @@ class Measurement {
             add_lights();
             add_masks();
             add_sky();
+            if (glossy_) glossy_->forget_runs();
             ++runs_;
             if (runs_ >= fewest_runs) estimate_errors();
         }
@@ -63,6 +78,7 @@ class Measurement {
             result.maps.layers.push_back(std::move(sum.layer));
         }
         light_.describe(runs_, result.report);
+        if (glossy_) glossy_->describe(result.report);
         result.report.relative_error = error_;
         result.report.target_met =
             plan_.accuracy.samples || plan_.accuracy.target() == 0 || error_ <= plan_.accuracy.target();
@@ -104,16 +120,16 @@ class Measurement {
         }
     }
 
-    // field(unknown, column) over sqrt(area), in units of the base plane's irradiance.
     static const float* column_of(const Fields& fields, int column) {
         return fields.block(column / column_block) + column % column_block;
     }
 
     void add_lights() {
+        if (glossy_ && !plan_.incident.empty()) glossy_->add_run();
         for (size_t first = 0; first < plan_.incident.size(); first += columns_at_once) {
             const std::vector<Vec3> lights = vectors(plan_.incident, first);
             const LightIrradiance direct = light_.irradiance(lights);
-            const Radiosity all = light_.radiosity(direct.lights);
+            const std::vector<Fields>* all = glossy_ ? nullptr : &light_.radiosity(lights, direct.lights);
             // The first order alone: the albedo once, no operator.
             for (size_t l = 0; l < lights.size(); ++l) {
                 const std::string name = numbered("light", first + l);
@@ -121,21 +137,31 @@ class Measurement {
                 const float* lit = column_of(direct.lights, column);
                 const double unit = 1 / lights[l].z;
                 for (int c = 0; c < light_.n_channels(); ++c) {
-                    const float* total = column_of(all.of_channel[c], column);
+                    if (glossy_) {
+                        add_light(
+                            name, c,
+                            [&](size_t u) { return unit * glossy_->direct_irradiance(u, first + l); },
+                            [&](size_t u) { return unit * glossy_->indirect_irradiance(u, c, first + l); });
+                        continue;
+                    }
+                    const float* total = column_of((*all)[c], column);
                     const auto direct_of = [&](size_t u) {
-                        return light_.albedo_of(c, u) * lit[u * column_block] * unit / light_.sqrt_area(u);
+                        return unit * light_.albedo_of(c, u) * lit[u * column_block];
                     };
-                    const auto total_of = [&](size_t u) {
-                        return total[u * column_block] * unit / light_.sqrt_area(u);
-                    };
-                    add(name + ".direct." + channels_[c], true, direct_of);
-                    add(name + ".indirect." + channels_[c], true,
-                        [&](size_t u) { return std::max(0.0, total_of(u) - direct_of(u)); });
-                    add(name + ".total." + channels_[c], true, total_of);
+                    add_light(name, c, direct_of, [&](size_t u) {
+                        return std::max(0.0, unit * total[u * column_block] - direct_of(u));
+                    });
                 }
                 add_share(name + ".shadow", lights[l], lit);
             }
         }
+    }
+
+    template <class Direct, class Indirect>
+    void add_light(const std::string& name, int channel, Direct&& direct, Indirect&& indirect) {
+        add(name + ".direct." + channels_[channel], true, direct);
+        add(name + ".indirect." + channels_[channel], true, indirect);
+        add(name + ".total." + channels_[channel], true, [&](size_t u) { return direct(u) + indirect(u); });
     }
 
     void add_masks() {
@@ -148,15 +174,14 @@ class Measurement {
         }
     }
 
-    // Visible share of a part: its irradiance factor over the unoccluded one.
+    // Visible share of a part: its irradiance over the unoccluded one.
     void add_share(const std::string& name, const Vec3& d, const float* factor) {
         const Tile& tile = light_.tile();
         add(name, false, [&](size_t u) {
             const size_t slot = u % tile.n_slots();
             const double cosine =
                 tile.normal_x[slot] * d.x + tile.normal_y[slot] * d.y + tile.normal_z[slot] * d.z;
-            return cosine > 1e-6 ? std::min(1.0, factor[u * column_block] / (tile.sqrt_area[slot] * cosine))
-                                 : 0.0;
+            return cosine > 1e-6 ? std::min(1.0, factor[u * column_block] / cosine) : 0.0;
         });
     }
 
@@ -178,7 +203,7 @@ class Measurement {
                 for (size_t u = 0; u < sky.size(); ++u) sky[u] += weight * factor[u * column_block];
             }
         }
-        add("sky", false, [&](size_t u) { return sky[u] / light_.sqrt_area(u); });
+        add("sky", false, [&](size_t u) { return sky[u]; });
     }
 
     static std::vector<Vec3> vectors(const std::vector<AnglesDeg>& angles, size_t first) {
@@ -210,7 +235,10 @@ class Measurement {
     const Monitor& monitor_;
     size_t n_cells_;
     std::chrono::steady_clock::time_point started_;
+    Material facets_;
     FacetLight light_;
+    BtfPlan lamps_;  // what glossy_ is lit by
+    std::optional<GlossyPixels> glossy_;
     std::vector<LayerSum> layers_;
     size_t next_ = 0;
     int runs_ = 0;
@@ -228,7 +256,9 @@ double memory_of(const HeightField& surface, const Material& material, const Map
     const Accuracy::Samples samples = samples_of(plan);
     const double unknowns = 2 * cells * samples.refinement * samples.refinement;
     return 100 * cells + 20 * cells * layers_of(material, plan) +
-           4 * unknowns * columns_at_once * (6 + static_cast<double>(material.channels.size())) +
+           4 * unknowns * columns_at_once *
+               (6 + 2.5 * (turned_coefficients(surface.base) - 1) +
+                static_cast<double>(material.channels.size())) +
            2 * cells * samples.directions * 0.35 * sizeof(Link);
 }
 

@@ -28,6 +28,9 @@ struct MapLayer {
 // plane, so that a white plane is 1); for every light shadow and for every view mask (share of the cell that
 // the light reaches, or that the viewer sees; facets that face away count as shadowed and masked); sky:
 // cosine-weighted share of the upper hemisphere that a facet sees (1 on a plane).
+//
+// What leaves a glossy facet depends on the view: there direct, indirect and total are irradiances, of what
+// arrives, over the same unit.
 struct Maps {
     int nx = 0, ny = 0;
     std::vector<MapLayer> layers;
@@ -38,7 +41,7 @@ struct MapsResult {
     Report report;
 };
 
-// Throws Error: for materials that are not Lambertian; limit; cancelled.
+// Throws Error: for mirrors; limit; cancelled.
 MapsResult measure_maps(const HeightField& surface, const Material& material, const MapsPlan& plan,
                         const RunOptions& options, const Monitor& monitor = {});
 Prediction predict_maps(const HeightField& surface, const Material& material, const MapsPlan& plan);

@@ -58,6 +58,9 @@ class Measurement {
           n_channels_(static_cast<int>(material.channels.size())),
           light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor),
           split_(split_key_lights(for_channels(environment, n_channels_))) {
+        if (surface.base.is_curved())
+            throw Error(ErrorCode::invalid_input, "/base", "",
+                        "an environment lights flat bases only; a BRDF, BTF or maps know curved ones");
         const double bytes = peak_bytes(surface, plan, n_channels_);
         if (bytes > static_cast<double>(options.max_bytes))
             throw Error(ErrorCode::limit, "/surface",
@@ -104,12 +107,12 @@ class Measurement {
         return uniform_double(random_words(plan_.accuracy.seed, stream + run, which)[0]);
     }
 
-    // sqrt(area) E at one place inside each facet part, [unknown][channel].
+    // Irradiance at one place inside each facet part, [unknown][channel].
     Fields irradiance(int run, const SubSample& place) {
         SliceOptions slices;
         slices.azimuths = plan_.azimuths;
         slices.shift = shift(run, 0);
-        Fields sum = sky_irradiance(light_.grid(), light_.tile(), split_.sky, place, slices,
+        Fields sum = sky_irradiance(light_.grid(), light_.unit_tile(), split_.sky, place, slices,
                                     options_.n_threads, monitor_);
         std::vector<Vec3> directions;
         for (const KeyLight& key : split_.key_lights) {
@@ -117,7 +120,7 @@ class Measurement {
             directions.push_back(direction_of(split_.sky, key, shift(run, 1 + 2 * k), shift(run, 2 + 2 * k)));
         }
         if (directions.empty()) return sum;
-        const LightIrradiance keys = light_irradiance(light_.grid(), light_.tile(), directions, {place},
+        const LightIrradiance keys = light_irradiance(light_.grid(), light_.unit_tile(), directions, {place},
                                                       options_.allow_skips, options_.n_threads, monitor_);
         for (size_t u = 0; u < sum.n_unknowns(); ++u)
             for (size_t k = 0; k < directions.size(); ++k) {
@@ -150,13 +153,14 @@ class Measurement {
         std::fill(seen.values().begin(), seen.values().end(), 0.0f);
         for (const SubSample& place : places) {
             const Fields direct = irradiance(run, place);
-            const LightIrradiance views = light_irradiance(
-                light_.grid(), tile, views_, {place}, options_.allow_skips, options_.n_threads, monitor_);
+            const LightIrradiance views =
+                light_irradiance(light_.grid(), light_.unit_tile(), views_, {place}, options_.allow_skips,
+                                 options_.n_threads, monitor_);
             parallel_for(static_cast<int>(n_views), options_.n_threads, [&](int v) {
                 for (size_t u = 0; u < tile.n_unknowns(); ++u) {
-                    const double g = share * value(views.lights, u, v);
+                    const double g = share * light_.area(u) * value(views.lights, u, v);
                     if (g == 0) continue;
-                    projected[v] += g * light_.sqrt_area(u);
+                    projected[v] += g;
                     for (int c = 0; c < n_channels_; ++c)
                         sent[c * n_views + v] += g * light_.albedo_of(c, u) * value(direct, u, c);
                 }
@@ -166,13 +170,13 @@ class Measurement {
             for (size_t k = 0; k < seen.values().size(); ++k)
                 seen.values()[k] += static_cast<float>(share) * views.lights.values()[k];
         }
-        const Radiosity radiosity = light_.radiosity(mean);
+        const std::vector<Fields>& radiosity = light_.radiosity(mean);
         parallel_for(static_cast<int>(n_views), options_.n_threads, [&](int v) {
             for (size_t u = 0; u < tile.n_unknowns(); ++u) {
-                const double g = value(seen, u, v);
+                const double g = light_.area(u) * value(seen, u, v);
                 if (g == 0) continue;
                 for (int c = 0; c < n_channels_; ++c)
-                    sent[c * n_views + v] += g * (static_cast<double>(value(radiosity.of_channel[c], u, c)) -
+                    sent[c * n_views + v] += g * (static_cast<double>(value(radiosity[c], u, c)) -
                                                   light_.albedo_of(c, u) * value(mean, u, c));
             }
         });
@@ -184,9 +188,9 @@ class Measurement {
         means_.add(means);
         for (int c = 0; c < n_channels_; ++c)
             for (size_t u = 0; u < tile.n_unknowns(); ++u) {
-                const double b = value(radiosity.of_channel[c], u, c);
+                const double b = value(radiosity[c], u, c);
                 sums_[c][u] += b;
-                squares_[c] += b * b;
+                squares_[c] += light_.area(u) * b * b;
             }
     }
 
@@ -223,16 +227,16 @@ class Measurement {
         relit.n_facets = 2 * static_cast<size_t>(surface_.nx) * surface_.ny * light_.tile().n_parts();
         relit.radiance.resize(n_channels_ * relit.n_facets);
         double area = 0;
-        for (size_t u = 0; u < light_.tile().n_unknowns(); ++u) area += std::pow(light_.sqrt_area(u), 2);
+        for (size_t u = 0; u < light_.tile().n_unknowns(); ++u) area += light_.area(u);
         for (int c = 0; c < n_channels_; ++c) {
             double squares = 0;
-            for (const double sum : sums_[c]) squares += sum * sum;
+            for (size_t u = 0; u < sums_[c].size(); ++u)
+                squares += light_.area(u) * sums_[c][u] * sums_[c][u];
             const double variance = std::max(0.0, (squares_[c] - squares / runs) / (runs - 1)) / area;
             relit.radiance_se.push_back(std::sqrt(variance / runs) / pi);
             for (size_t facet = 0; facet < relit.n_facets; ++facet) {
                 const size_t u = light_.unknown_of(facet);
-                relit.radiance[c * relit.n_facets + facet] =
-                    static_cast<float>(sums_[c][u] / (pi * runs * light_.sqrt_area(u)));
+                relit.radiance[c * relit.n_facets + facet] = static_cast<float>(sums_[c][u] / (pi * runs));
             }
         }
         const double mesh = predict_mesh_bias(surface_).guess / std::pow(light_.samples().refinement, 2),
@@ -286,8 +290,8 @@ class Measurement {
     std::vector<Vec3> views_;
     RelightResult result_;
     Moments means_;                          // [channel][view]
-    std::vector<std::vector<double>> sums_;  // sqrt(area) exitance over the runs, [channel][unknown]
-    std::vector<double> squares_;            // of them, over unknowns and runs, [channel]
+    std::vector<std::vector<double>> sums_;  // exitance over the runs, [channel][unknown]
+    std::vector<double> squares_;            // area times their squares, over unknowns and runs, [channel]
     double error_ = 0, unresolved_ = 0;
 };
 

@@ -14,9 +14,6 @@
 namespace gonio {
 namespace {
 
-// Turned lights are evaluated this many times the rms turn along links away: most turns lie within.
-constexpr double turn_step = 1.5;
-
 std::vector<Block> run_blocks(const RunContext& context, const RunSettings& settings) {
     const int n_lights = static_cast<int>(context.lights.size()),
               n_views = static_cast<int>(context.views.size());
@@ -160,8 +157,8 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
                         padded(std::max(n_views, n_views == 0 ? n_lights : 0)) * 8 * 6;
     const double links =
         unknowns * settings.directions / (settings.refinement * settings.refinement) * 0.35 * sizeof(Link);
-    const bool both = s.base.kappa_1 != 0 && s.base.kappa_2 != 0;
-    const double turned = s.base.is_curved() ? (both ? 6 : 3) * 2.5 * unknowns * 4 * padded(n_lights) : 0;
+    const double turned =
+        s.base.is_curved() ? turned_coefficients(s.base) * 2.5 * unknowns * 4 * padded(n_lights) : 0;
     return turned + copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
 }
 
@@ -241,11 +238,9 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                 const bool curved = context.surface->base.is_curved();
                 TurnedLight turned;
                 if (curved) {
-                    const double turn = rms_turn(op);
-                    values.turn = std::max(values.turn, turn);
-                    turned = turned_light(*context.grid, tile, lights, irradiance.lights,
-                                          std::clamp(turn_step * turn, 1e-3, 0.3), sub_samples,
-                                          context.allow_skips, n_threads, monitor);
+                    values.turn = std::max(values.turn, rms_turn(op));
+                    turned = turned_light(*context.grid, tile, lights, irradiance.lights, turn_step(op),
+                                          sub_samples, context.allow_skips, n_threads, monitor);
                     values.rays += turned.rays;
                 }
                 const Fields base_lights = factors.size() > 1 ? irradiance.lights : Fields(),

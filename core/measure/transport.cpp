@@ -60,9 +60,9 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
     if (kind == TransportKind::forward && scene.plan->outgoing_cells.empty())
         throw Error(ErrorCode::invalid_input, "/measure/transport", "forward",
                     "needs \"outgoing\": receivers of finite size, " + cells);
-    if (kind != TransportKind::forward && !scene.plan->outgoing_cells.empty())
-        throw Error(ErrorCode::invalid_input, "/measure/transport", name_of(kind),
-                    "answers single directions: leave it to \"auto\", or ask for them in place of cells");
+    if (kind == TransportKind::pair_graph && has_mirror(*scene.material))
+        throw Error(ErrorCode::invalid_input, "/measure/transport", "pair_graph",
+                    "carries no mirrors: leave it to \"auto\", or take \"forward\"");
     report.settings.push_back({"transport", name_of(kind)});
     report.settings.push_back({"transport_why", why});
     switch (kind) {

@@ -66,8 +66,8 @@ class Transport {
 };
 
 // A transport of the scene (which must outlive it), chosen by plan.transport or, for `automatic`, by the
-// material and the error that each is predicted to leave; which and why goes into report.settings. Throws
-// Error(invalid_input, "/measure/transport") for a forced one that cannot do this material.
+// receivers and the material; which and why goes into report.settings. Throws Error(invalid_input,
+// "/measure/transport") for a forced one that cannot do this material.
 std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& report);
 
 }  // namespace gonio

@@ -25,7 +25,7 @@ void add_direct(const SlotMaterial& material, const Tile& tile, const DirectionA
     std::vector<std::vector<double>> partial(n_groups);
     parallel_for(n_groups, n_threads, [&](int group) {
         partial[group].assign(size, 0.0);
-        DirectScratch scratch;
+        DirectScratch scratch(lights, views);
         const size_t begin = stretches.size() * group / n_groups,
                      end = stretches.size() * (group + 1) / n_groups;
         for (size_t k = begin; k < end; ++k) {

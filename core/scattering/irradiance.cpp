@@ -56,9 +56,7 @@ void expand_directions(const MarchGrid& grid, const Tile& tile, const std::vecto
                     corrected_visible(grid, d, point, tile.area, to);
                     return;
                 }
-                const RayBundle bundle = make_ray_bundle(grid, d, point, max_march_travel);
-                march_visible(grid, bundle, tile.area, to);
-                counts.truncated += bundle.truncated;
+                counts.truncated += visible_along(grid, d, point, max_march_travel, tile.area, to);
             });
             constexpr size_t chunk = 1024;
             float* to = out.block(block) + part * tile.n_slots() * column_block;

@@ -141,7 +141,7 @@ void trace_group(const MarchGrid& grid, const Tile& tile, const std::vector<Oper
 
 // Groups the pending links by the unknown they start from (counting sort, stable: the order of the directions
 // stays).
-void append_records(const Tile& tile, const LineGroup& group, const std::vector<OperatorBundle>& bundles,
+void append_records(const Tile& tile, const LineGroup& group, const std::vector<Turning>& turnings,
                     const PendingLinks& pending, const BaseCurvature& base, LinkOperator::Chunk& chunk) {
     const int width = group.transposed ? tile.area.height : tile.area.width;
     std::vector<uint32_t> place(static_cast<size_t>(width) * group.n_lines, 0);
@@ -169,7 +169,7 @@ void append_records(const Tile& tile, const LineGroup& group, const std::vector<
         chunk.links[at] = pending.links[k].link;
         if (!base.is_curved()) continue;
         const LinkOrigin& origin = pending.origins[k];
-        const double* about = bundles[2 * origin.direction + group.kind].turning.about;
+        const double* about = turnings[origin.direction].about;
         chunk.turns[at] = {
             {static_cast<float>(origin.travel * about[0]), static_cast<float>(origin.travel * about[1])}};
         if (base.corrects_horizons()) chunk.origins[at] = origin;
@@ -182,17 +182,28 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
                                  const std::vector<SubSample>& jitter, int n_threads,
                                  const Monitor& monitor) {
     const int n_directions = static_cast<int>(set.directions.size()), n_parts = tile.n_parts();
-    std::vector<OperatorBundle> bundles(2 * static_cast<size_t>(n_directions));
-    parallel_for(2 * n_directions, n_threads, [&](int task) {
-        const int i = task / 2, kind = task % 2, part = i % n_parts;
-        const FacetPoint point = facet_point(kind, jitter[i].a, jitter[i].b, tile.refinement, part);
-        bundles[task] = {make_ray_bundle(grid, set.directions[i], point, max_march_travel),
-                         set.directions[i],
-                         set.solid_angle[i] * n_parts / (2 * pi),
-                         kind,
-                         part,
-                         i};
-        if (grid.base.is_curved()) bundles[task].turning = turning_along(grid, set.directions[i]);
+    std::vector<OperatorBundle> bundles;
+    std::vector<StartHeights> layers;  // parallel
+    std::vector<Turning> turnings(n_directions);
+    for (int i = 0; i < n_directions; ++i) {
+        if (grid.base.is_curved()) turnings[i] = turning_along(grid, set.directions[i]);
+        for (int kind = 0; kind < 2; ++kind)
+            for (const StartHeights& layer : start_heights(grid, set.directions[i])) {
+                bundles.push_back({{},
+                                   set.directions[i],
+                                   set.solid_angle[i] * n_parts / (2 * pi),
+                                   kind,
+                                   i % n_parts,
+                                   i,
+                                   turnings[i]});
+                layers.push_back(layer);
+            }
+    }
+    parallel_for(static_cast<int>(bundles.size()), n_threads, [&](int task) {
+        OperatorBundle& bundle = bundles[task];
+        const SubSample& place = jitter[bundle.index];
+        const FacetPoint point = facet_point(bundle.kind, place.a, place.b, tile.refinement, bundle.part);
+        bundle.rays = make_ray_bundle(grid, bundle.direction, point, max_march_travel, layers[task]);
     });
 
     constexpr int lines_together = 4;
@@ -221,7 +232,7 @@ LinkOperator build_link_operator(const MarchGrid& grid, const Tile& tile, const 
             pending.links.clear();
             pending.origins.clear();
             trace_group(grid, tile, bundles, groups[g], lines, pending, counts[c]);
-            append_records(tile, groups[g], bundles, pending, grid.base, op.chunks[c]);
+            append_records(tile, groups[g], turnings, pending, grid.base, op.chunks[c]);
         }
         op.chunks[c].records.push_back({0, static_cast<uint32_t>(op.chunks[c].links.size())});
     });

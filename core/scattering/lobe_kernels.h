@@ -42,9 +42,11 @@ struct DirectSlots {
     size_t light_stride = 0, view_stride = 0;
 };
 
-// Room for the kernels to work in, one a thread.
+// What one thread works with: room, and of each pair of light and view its cosine and 1 / |l + v|.
 struct DirectScratch {
-    std::vector<float> light_factors, view_factors;
+    std::vector<uint32_t> light_bits, view_bits;
+    std::vector<float> light_factors, view_factors, cos_ab, inverse;
+    DirectScratch(const DirectionArrays& lights, const DirectionArrays& views);
 };
 
 // sums[l * views.n + v] += sum over the slots of area f(n; l, v) <n,l> <n,v> popcount(bits_l & bits_v); for

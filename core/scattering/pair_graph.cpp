@@ -209,17 +209,20 @@ class Sweep {
     std::vector<float> core_area_;
 };
 
-}  // namespace
+void add_scaled(HugeFloats& to, const HugeFloats& from, float factor) {
+    for (size_t k = 0; k < to.size(); ++k) to[k] += factor * from[k];
+}
 
-GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
-                           const GraphSide& lights, const GraphSide& views, const GraphOptions& options,
-                           int n_threads, const Monitor& monitor) {
-    const Sweep sweep(graph, tile, material, lights, views, n_threads, monitor);
-    GraphOrders result;
+// The light of all orders that arrives over the pairs; or of each of them at the views, if they are kept.
+HugeFloats sweep_orders(const Sweep& sweep, const GraphOptions& options, GraphOrders& result) {
     HugeFloats radiance, next, total;
     sweep.first_order(radiance);
     if (!options.keep_orders) total = radiance;
     const double direct = sweep.arrived_directly();
+    // Orders that are not wanted one by one go on for ever as the last two do: alike for all lights and views
+    // by then, but for a fifth.
+    constexpr double doubt_of_tail = 0.2;
+    const bool continues = !options.keep_orders && options.max_order == 0;
     double before = direct, now = sweep.arrived(radiance);
     const int most = options.max_order > 0      ? options.max_order - 1
                      : options.fixed_orders > 0 ? options.fixed_orders
@@ -227,8 +230,9 @@ GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotM
     for (result.n_orders = 1;; ++result.n_orders) {
         if (options.keep_orders) result.orders.push_back(sweep.received(radiance));
         result.ratio = before > 0 ? now / before : 0.0;
-        const double decline = std::min(result.ratio, 0.95),
-                     left = direct > 0 ? now * decline / (1 - decline) / direct : 0.0;
+        const double decline = std::min(result.ratio, 0.95);
+        double left = direct > 0 ? now * decline / (1 - decline) / direct : 0.0;
+        if (continues) left *= doubt_of_tail;
         if (options.max_order == 0) result.remainder = left;
         if (result.n_orders >= most || (options.fixed_orders == 0 && left < options.tolerance)) break;
         sweep.next_order(radiance, next, options.keep_orders ? nullptr : &total, result.heaviest);
@@ -236,8 +240,29 @@ GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotM
         before = now;
         now = sweep.arrived(radiance);
     }
+    if (continues) {
+        const double decline = std::min(result.ratio, 0.95);
+        add_scaled(total, radiance, static_cast<float>(decline / (1 - decline)));
+    }
+    return total;
+}
+
+}  // namespace
+
+GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                           const GraphSide& lights, const GraphSide& views, const GraphOptions& options,
+                           int n_threads, const Monitor& monitor) {
+    const Sweep sweep(graph, tile, material, lights, views, n_threads, monitor);
+    GraphOrders result;
+    const HugeFloats total = sweep_orders(sweep, options, result);
     if (!options.keep_orders) result.orders.push_back(sweep.received(total));
     return result;
+}
+
+HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                          const GraphSide& lights, const GraphOptions& options, int n_threads,
+                          const Monitor& monitor, GraphOrders& series) {
+    return sweep_orders(Sweep(graph, tile, material, lights, lights, n_threads, monitor), options, series);
 }
 
 double scatter_bytes(double n_pairs, int n_lights, int n_views) {

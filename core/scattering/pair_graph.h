@@ -44,15 +44,17 @@ struct GraphOptions {
     int max_order = 0;         // 0: all; K: orders 2..K
     int fixed_orders = 0;      // > 0: just so many, whatever the tolerance: runs that are averaged must agree
     bool keep_orders = false;  // a product for each order instead of one for their sum
-    double tolerance = 1e-4;   // of what is left out, relative to the light that comes in
+    double tolerance = 1e-4;   // of GraphOrders::remainder
 };
 
 // Lights x views, in the units of add_direct: sums over the core.
 struct GraphOrders {
     std::vector<Matrix> orders;  // [k] is order k + 2 if kept apart; else one matrix, the sum of all
     int n_orders = 0;
-    double ratio = 0;      // of one order to the one before, at the end
-    double remainder = 0;  // of what is left out to the light that comes in; 0 for limited orders
+    double ratio = 0;  // of one order to the one before, at the end
+    // Doubt about what comes after, relative to the light that comes in: all of it, or what its continuation
+    // by `ratio` (part of the sum) may be wrong. 0 for limited orders.
+    double remainder = 0;
     double heaviest = 0;  // largest share of its light that one pair passes on to another: > 1 where the lobe
                           // is narrower than the directions are dense
 };
@@ -67,6 +69,13 @@ struct GraphSide {
 GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
                            const GraphSide& lights, const GraphSide& views, const GraphOptions& options,
                            int n_threads, const Monitor& monitor);
+
+// The radiance that arrives over every pair, [pair][lights.directions.padded()], of all orders together:
+// what a facet p sends to a view is its first order and the sum over its pairs of omega <n_p, d_i>
+// f(n_p; d_i, v) times that. For pictures. `series`: as scatter_orders says, without orders.
+HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                          const GraphSide& lights, const GraphOptions& options, int n_threads,
+                          const Monitor& monitor, GraphOrders& series);
 
 // Memory of scatter_orders beside the graph, bytes.
 double scatter_bytes(double n_pairs, int n_lights, int n_views);

@@ -26,8 +26,8 @@ int hit_part(const MarchGrid& grid, const RayBundle& rays, int cell_x, int cell_
     const double share = std::clamp(before / (before - after), 0.0, 1.0);
     const double travel = rays.facets[k - 1].travel +
                           share * (static_cast<double>(rays.facets[k].travel) - rays.facets[k - 1].travel);
-    double u = rays.start.u + rays.direction.step_x * travel - rays.facets[k].column;
-    double v = rays.start.v + rays.direction.step_y * travel - rays.facets[k].row;
+    const auto [x, y] = rays.path.at(travel);
+    double u = x - rays.facets[k].column, v = y - rays.facets[k].row;
     if (rays.transposed) std::swap(u, v);
     return facet_part(kind, u, v, refinement);
 }

@@ -122,9 +122,8 @@ struct Builder {
         base.coat_eta = on_slots(value_of(l.eta));
         base.coat_alpha = on_slots(value_of(l.alpha));
         base.weight = on_slots([&](int i, int j) {
-            const double eta = l.eta.at(0, i, j), albedo = l.albedo.at(channel, i, j),
-                         leaves = mean_coat_transmittance(eta, l.alpha.at(0, i, j)) / (eta * eta);
-            return weight(i, j) * albedo / (pi * eta * eta * (1 - albedo * (1 - leaves)));
+            return weight(i, j) / pi *
+                   coat_base_factor(l.eta.at(0, i, j), l.alpha.at(0, i, j), l.albedo.at(channel, i, j));
         });
         result.lobes.push_back(std::move(base));
     }

@@ -8,7 +8,7 @@
 
 namespace gonio {
 
-// One lobe that is not Lambertian. f = weight * shape (* Fresnel): shape per lobe_kernels.cpp, whatever
+// One lobe that is not Lambertian. f = weight * shape (* Fresnel): shape per lobe_shapes-inl.h, whatever
 // scales it (normalisation, reflectance, weight in the mixture) inside `weight`.
 struct SlotLobe {
     enum class Shape { ggx, beckmann, blinn_phong, phong, coat_base };

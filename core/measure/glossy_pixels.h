@@ -1,0 +1,71 @@
+// The light of random runs on glossy facets, and what pixels see of it. Internal to measure/.
+#pragma once
+#include <vector>
+
+#include "measure/btf.h"
+#include "measure/graph_run.h"
+
+namespace gonio {
+
+// What one run keeps, and needs beside while it is made.
+double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples);
+
+class GlossyPixels {
+  public:
+    // The references must outlive it. Throws Error.
+    GlossyPixels(const HeightField& surface, const Material& material, const BtfPlan& plan,
+                 const Accuracy::Samples& samples, const RunOptions& options, const Monitor& monitor);
+
+    const MarchGrid& grid() const { return grid_; }
+    int n_runs() const { return static_cast<int>(runs_.size()); }  // that are kept
+    bool fits_another() const;                                     // into the working memory
+    void add_run();                                                // throws Error(limit) if it does not fit
+
+    // Of `count` pixels of a view from `first` on, L / (E0 cos_i) in 1/sr: [run][pixel][light]. map: the
+    // view's, [sample][pixel] as in Btf. Thread-safe.
+    std::vector<float> values(const BtfShape& shape, const std::vector<uint32_t>& map, int view, int channel,
+                              size_t first, size_t count) const;
+
+    // Of the last run, in units of what a facet that faces the lamp receives: irradiance by the lamp itself,
+    // and by light that comes over other facets.
+    double direct_irradiance(size_t unknown, size_t light) const {
+        return runs_.back().lit.of(unknown)[light];
+    }
+    double indirect_irradiance(size_t unknown, size_t channel, size_t light) const;
+    void forget_runs() { runs_.clear(); }
+
+    double remainder() const { return remainder_; }  // as in GraphOrders: the largest
+    double heaviest() const { return heaviest_; }
+    void describe(Report& report) const;
+
+  private:
+    struct Run {
+        VisibleCosines lit;  // [unknown][light]
+        PairGraph graph;
+        std::vector<std::vector<HugeFloats>> arriving;  // [channel][block of lights]
+    };
+    // Factor of the light that arrives over each pair of the facets, in their order, on its way to a view.
+    void add_pair_weights(const Run& run, int channel, const Vec3& view, const uint32_t* unknowns, size_t n,
+                          std::vector<float>& weights) const;
+
+    const HeightField& surface_;
+    const BtfPlan& plan_;
+    Accuracy::Samples samples_;
+    const RunOptions& options_;
+    const Monitor& monitor_;
+    MarchGrid grid_;
+    Tile tile_;
+    GraphContext context_;
+    std::vector<SlotMaterial> materials_;  // one a channel
+    std::vector<Vec3> lights_;
+    std::vector<DirectionArrays> light_blocks_;
+    std::vector<Vec3> cameras_;
+    double plane_height_ = 0;
+    double run_bytes_ = 0;
+    int started_runs_ = 0;
+    std::vector<Run> runs_;
+    double rays_ = 0, pairs_ = 0, truncated_ = 0, remainder_ = 0, heaviest_ = 0;
+    int orders_ = 0;
+};
+
+}  // namespace gonio

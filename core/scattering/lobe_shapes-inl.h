@@ -1,0 +1,225 @@
+// The shapes of facet reflectances on vectors of facets or directions: what lobe_rows.cpp and lobe_direct.cpp
+// compile for every instruction set (Highway's way: included once for each of them).
+#if defined(GONIO_SCATTERING_LOBE_SHAPES_INL_H) == defined(HWY_TARGET_TOGGLE)
+#ifdef GONIO_SCATTERING_LOBE_SHAPES_INL_H
+#undef GONIO_SCATTERING_LOBE_SHAPES_INL_H
+#else
+#define GONIO_SCATTERING_LOBE_SHAPES_INL_H
+#endif
+
+#include <hwy/highway.h>
+// After highway.h.
+#include <hwy/contrib/math/math-inl.h>
+
+#include "material/coat.h"
+#include "scattering/slot_material.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace gonio {
+namespace HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+using D = hn::CappedTag<float, 16>;
+using DU = hn::RebindToUnsigned<D>;
+using VF = hn::Vec<D>;
+using Shape = SlotLobe::Shape;
+
+constexpr float least_cosine = 1e-9f;
+
+HWY_INLINE VF reciprocal(VF x) {
+    const VF r = hn::ApproximateReciprocal(x);
+    return hn::Mul(r, hn::NegMulAdd(x, r, hn::Set(D(), 2.0f)));
+}
+HWY_INLINE VF reciprocal_sqrt(VF x) {
+    const VF r = hn::ApproximateReciprocalSqrt(x), half = hn::Mul(hn::Mul(x, r), hn::Set(D(), 0.5f));
+    return hn::Mul(r, hn::NegMulAdd(half, r, hn::Set(D(), 1.5f)));
+}
+HWY_INLINE VF dot(VF ax, VF ay, VF az, VF bx, VF by, VF bz) {
+    return hn::MulAdd(ax, bx, hn::MulAdd(ay, by, hn::Mul(az, bz)));
+}
+HWY_INLINE VF square(VF x) {
+    return hn::Mul(x, x);
+}
+
+// exp(a^2) erfc(a) for a >= 0: Numerical Recipes' Chebyshev fit, 1.2e-7.
+HWY_INLINE VF scaled_erfc(VF a) {
+    const D d;
+    const VF t = hn::Div(hn::Set(d, 1.0f), hn::MulAdd(a, hn::Set(d, 0.5f), hn::Set(d, 1.0f)));
+    VF p = hn::Set(d, 0.17087277f);
+    for (const float c : {-0.82215223f, 1.48851587f, -1.13520398f, 0.27886807f, -0.18628806f, 0.09678418f,
+                          0.37409196f, 1.00002368f, -1.26551223f})
+        p = hn::MulAdd(p, t, hn::Set(d, c));
+    return hn::Mul(t, hn::Exp(d, p));
+}
+
+// What a direction contributes to a lobe of one facet: cosine z; s, of which za sb + zb sa is
+// 2 za zb (1 + Lambda_a + Lambda_b) (or what passes the coat); its tangential parts over alpha.
+struct Factors {
+    VF z, s, x, y;
+};
+
+// The numbers of a lobe for the facets of one vector, or of one facet in all lanes.
+struct LobeNumbers {
+    VF weight, alpha2, sharpness, eta, k, alpha_x4, alpha_y4;
+    VF tx, ty, tz, bx, by, bz;
+};
+
+template <Shape shape, bool aniso, bool fresnel, class Load>
+HWY_INLINE LobeNumbers load_numbers(const SlotLobe& lobe, Load&& load) {
+    LobeNumbers n;
+    n.weight = load(lobe.weight);
+    if constexpr (shape == Shape::ggx || shape == Shape::beckmann) {
+        if constexpr (aniso) {
+            n.tx = load(lobe.tangent_x), n.ty = load(lobe.tangent_y), n.tz = load(lobe.tangent_z);
+            n.bx = load(lobe.bitangent_x), n.by = load(lobe.bitangent_y), n.bz = load(lobe.bitangent_z);
+            n.alpha_x4 = load(lobe.alpha_x4), n.alpha_y4 = load(lobe.alpha_y4);
+        } else {
+            n.alpha2 = load(lobe.alpha2);
+            n.sharpness = load(lobe.sharpness);
+        }
+        if constexpr (fresnel) n.eta = load(lobe.eta), n.k = load(lobe.k);
+    } else if constexpr (shape != Shape::coat_base) {
+        n.sharpness = load(lobe.sharpness);
+    }
+    return n;
+}
+
+template <Shape shape, bool aniso>
+HWY_INLINE Factors factors_of(const LobeNumbers& n, VF z, VF dx, VF dy, VF dz) {
+    const D d;
+    Factors f;
+    f.z = hn::Max(z, hn::Set(d, least_cosine));
+    f.s = f.x = f.y = hn::Zero(d);
+    if constexpr (shape == Shape::ggx || shape == Shape::beckmann) {
+        VF rough2;  // alpha^2 sin^2
+        if constexpr (aniso) {
+            f.x = dot(n.tx, n.ty, n.tz, dx, dy, dz);
+            f.y = dot(n.bx, n.by, n.bz, dx, dy, dz);
+            rough2 = hn::MulAdd(n.alpha_x4, square(f.x), hn::Mul(n.alpha_y4, square(f.y)));
+        } else {
+            rough2 = hn::Mul(n.alpha2, hn::Max(hn::Zero(d), hn::NegMulAdd(f.z, f.z, hn::Set(d, 1.0f))));
+        }
+        if constexpr (shape == Shape::ggx) {
+            const VF s2 = hn::MulAdd(f.z, f.z, rough2);
+            f.s = hn::Mul(s2, reciprocal_sqrt(hn::Max(s2, hn::Set(d, 1e-30f))));
+        } else {
+            // Lambda = (exp(-a^2) / (a sqrt(pi)) - erfc(a)) / 2, a = cot / alpha
+            const VF a =
+                hn::Min(hn::Div(f.z, hn::Sqrt(hn::Max(rough2, hn::Set(d, 1e-30f)))), hn::Set(d, 9.0f));
+            const VF scaled = hn::Sub(hn::Div(hn::Set(d, 0.564189584f), a), scaled_erfc(a));
+            const VF lambda2 = hn::Mul(hn::Exp(d, hn::Neg(square(a))), hn::Max(scaled, hn::Zero(d)));
+            f.s = hn::MulAdd(f.z, lambda2, f.z);
+        }
+    }
+    return f;
+}
+
+// Fresnel's equations as in material/fresnel.h; cos_2 of the angle to the half vector.
+HWY_INLINE VF fresnel_factor(VF cos_2, VF eta, VF k) {
+    const D d;
+    const VF zero = hn::Zero(d), one = hn::Set(d, 1.0f);
+    const VF c = hn::Sqrt(cos_2), sin_2 = hn::Max(zero, hn::Sub(one, cos_2));
+    const VF real = hn::Sub(hn::MulSub(eta, eta, square(k)), sin_2),
+             imaginary = hn::Mul(hn::Set(d, 2.0f), hn::Mul(eta, k));
+    const VF length = hn::Sqrt(hn::MulAdd(real, real, square(imaginary)));
+    const VF tiny = hn::Set(d, 1e-30f), half = hn::Set(d, 0.5f);
+    const VF u = hn::IfThenElse(
+        hn::Gt(real, zero), hn::Sqrt(hn::Mul(half, hn::Add(length, real))),
+        hn::Div(imaginary, hn::Sqrt(hn::Max(tiny, hn::Mul(hn::Set(d, 2.0f), hn::Sub(length, real))))));
+    const VF cu = hn::Mul(hn::Mul(hn::Set(d, 2.0f), c), u), sum = hn::Add(length, cos_2);
+    const VF s = hn::Div(hn::Sub(sum, cu), hn::Max(tiny, hn::Add(sum, cu)));
+    const VF a = hn::MulAdd(cos_2, length, square(sin_2)), b = hn::Mul(cu, sin_2);
+    const VF p = hn::Div(hn::Sub(a, b), hn::Max(tiny, hn::Add(a, b)));
+    return hn::Mul(hn::Mul(half, s), hn::Add(one, p));
+}
+
+// cos_ab between the two directions, inverse: 1 / |a + b|.
+template <Shape shape, bool aniso, bool fresnel>
+HWY_INLINE VF lobe_value(const LobeNumbers& n, const Factors& a, const Factors& b, VF cos_ab, VF inverse) {
+    const D d;
+    const VF one = hn::Set(d, 1.0f), zero = hn::Zero(d);
+    if constexpr (shape == Shape::coat_base) {
+        return hn::Mul(n.weight, hn::Mul(a.s, b.s));
+    } else if constexpr (shape == Shape::phong) {
+        const VF mirrored = hn::MulSub(hn::Add(a.z, a.z), b.z, cos_ab);
+        const VF power =
+            hn::Exp(d, hn::Mul(n.sharpness, hn::Log(d, hn::Clamp(mirrored, hn::Set(d, 1e-30f), one))));
+        const auto there = hn::Or(hn::Gt(mirrored, zero), hn::Le(n.sharpness, zero));
+        return hn::IfThenElseZero(there, hn::Mul(n.weight, power));
+    } else {
+        const VF nh = hn::Min(hn::Mul(hn::Add(a.z, b.z), inverse), one), nh2 = square(nh);
+        if constexpr (shape == Shape::blinn_phong) {
+            const VF log = hn::Log(d, hn::Max(nh, hn::Set(d, 1e-30f)));
+            return hn::Mul(n.weight, hn::Exp(d, hn::Mul(n.sharpness, log)));
+        } else {
+            // tan^2 / alpha^2, times nh^2.
+            VF slope2 = zero;
+            if constexpr (aniso)
+                slope2 = hn::Mul(hn::MulAdd(hn::Add(a.x, b.x), hn::Add(a.x, b.x), square(hn::Add(a.y, b.y))),
+                                 square(inverse));
+            else if constexpr (shape == Shape::beckmann)
+                slope2 = hn::Mul(hn::Sub(one, nh2), n.sharpness);
+            const VF smith = hn::MulAdd(a.z, b.s, hn::Mul(b.z, a.s));
+            const VF least = hn::Set(d, 1e-30f);  // what pads a tile has no normal
+            VF value;
+            if constexpr (shape == Shape::ggx) {
+                // 1 - cos^2 first: of a narrow lobe's sharpness, 1e12, nothing is left of a 1 added to it.
+                const VF q = hn::Add(aniso ? slope2 : hn::Mul(hn::Sub(one, nh2), n.sharpness), nh2);
+                value = hn::Mul(n.weight, reciprocal(hn::Max(hn::Mul(square(q), smith), least)));
+            } else {
+                const VF safe2 = hn::Max(nh2, hn::Set(d, 1e-12f));
+                const VF falls = hn::Exp(d, hn::Neg(hn::Min(hn::Div(slope2, safe2), hn::Set(d, 80.0f))));
+                value = hn::Mul(hn::Mul(n.weight, falls),
+                                reciprocal(hn::Max(hn::Mul(square(safe2), smith), least)));
+            }
+            if constexpr (fresnel) {
+                const VF cos_2 =
+                    hn::Mul(hn::Set(d, 0.5f), hn::Add(one, hn::Clamp(cos_ab, hn::Neg(one), one)));
+                value = hn::Mul(value, fresnel_factor(cos_2, n.eta, n.k));
+            }
+            return value;
+        }
+    }
+}
+
+// What passes the coat, from the table of the material: not one of the fast shapes.
+HWY_INLINE VF coat_factors(const SlotLobe& lobe, const size_t* slots, VF z) {
+    const D d;
+    const size_t lanes = hn::Lanes(d);
+    HWY_ALIGN float values[16];
+    hn::Store(z, d, values);
+    for (size_t k = 0; k < lanes; ++k)
+        values[k] = static_cast<float>(
+            coat_transmittance(lobe.coat_eta[slots[k]], lobe.coat_alpha[slots[k]], values[k]));
+    return hn::Load(d, values);
+}
+
+// Calls visit.template operator()<shape, aniso, fresnel>().
+template <class Visit>
+HWY_INLINE void with_lobe(const SlotLobe& lobe, Visit&& visit) {
+    auto microfacet = [&]<Shape shape>() {
+        if (lobe.anisotropic)
+            lobe.fresnel ? visit.template operator()<shape, true, true>()
+                         : visit.template operator()<shape, true, false>();
+        else
+            lobe.fresnel ? visit.template operator()<shape, false, true>()
+                         : visit.template operator()<shape, false, false>();
+    };
+    switch (lobe.shape) {
+        case Shape::ggx:
+            return microfacet.template operator()<Shape::ggx>();
+        case Shape::beckmann:
+            return microfacet.template operator()<Shape::beckmann>();
+        case Shape::blinn_phong:
+            return visit.template operator()<Shape::blinn_phong, false, false>();
+        case Shape::phong:
+            return visit.template operator()<Shape::phong, false, false>();
+        case Shape::coat_base:
+            return visit.template operator()<Shape::coat_base, false, false>();
+    }
+}
+
+}  // namespace HWY_NAMESPACE
+}  // namespace gonio
+HWY_AFTER_NAMESPACE();
+
+#endif  // toggled include guard
