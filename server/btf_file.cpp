@@ -96,15 +96,19 @@ std::vector<ArraySection> factored_arrays(const BtfShape& shape) {
     return sections;
 }
 
+ArraySection images_array(const BtfShape& shape) {
+    return {"images",
+            "<f2",
+            {static_cast<size_t>(shape.n_views), static_cast<size_t>(shape.n_lights),
+             static_cast<size_t>(shape.n_channels), static_cast<size_t>(shape.pixels_y),
+             static_cast<size_t>(shape.pixels_x)}};
+}
+
 void write_images(ordered_json head, const Btf& btf, const std::string& path, const Monitor& monitor) {
     const BtfShape& shape = btf.shape;
     head["form"] = "images";
     std::vector<ArraySection> sections = small_arrays(shape);
-    sections.push_back({"images",
-                        "<f2",
-                        {static_cast<size_t>(shape.n_views), static_cast<size_t>(shape.n_lights),
-                         static_cast<size_t>(shape.n_channels), static_cast<size_t>(shape.pixels_y),
-                         static_cast<size_t>(shape.pixels_x)}});
+    sections.push_back(images_array(shape));
     write_array_file(path, std::move(head), std::move(sections), [&](ArrayWriter& writer) {
         append_small(writer, btf);
         std::vector<uint16_t> images(shape.images_size() / shape.n_views);
@@ -137,6 +141,26 @@ void write_factored_btf(const LoadedJob& job, const Btf& btf, const std::string&
 
 void write_btf_images(const LoadedJob& job, const Btf& btf, const std::string& path, const Monitor& monitor) {
     write_images(head_of(job, btf), btf, path, monitor);
+}
+
+Btf write_glossy_images(const LoadedJob& job, GlossyBtf& glossy, const std::string& path,
+                        const std::function<void(int view, std::span<const uint16_t> images)>& on_view) {
+    Btf btf;
+    btf.shape = glossy.shape();
+    btf.mean.channels = job.material.channels;
+    btf.mean.provenance = glossy.report().settings;
+    ordered_json head = head_of(job, btf);
+    head["form"] = "images";
+    std::vector<ArraySection> sections = small_arrays(btf.shape);
+    sections.insert(sections.begin(), images_array(btf.shape));
+    write_array_file(path, std::move(head), std::move(sections), [&](ArrayWriter& writer) {
+        btf = glossy.pictures([&](int view, std::span<const uint16_t> images) {
+            writer.append(images);
+            on_view(view, images);
+        });
+        append_small(writer, btf);
+    });
+    return btf;
 }
 
 StoredBtf read_factored_btf(const std::string& path) {

@@ -13,6 +13,7 @@
 
 #include "base/monitor.h"
 #include "measure/btf.h"
+#include "measure/glossy_btf.h"
 #include "server/run_job.h"
 
 namespace gonio {
@@ -23,6 +24,11 @@ const BtfPlan& pictures_of(const LoadedJob& job);
 void write_factored_btf(const LoadedJob& job, const Btf& btf, const std::string& path);
 // Streamed, the images of one view at a time.
 void write_btf_images(const LoadedJob& job, const Btf& btf, const std::string& path, const Monitor& monitor);
+
+// Of glossy facets: measured while it is written, one view after the other, which on_view is shown, too;
+// `images` comes before the means. There is no factored form: a facet sends another radiance to every view.
+Btf write_glossy_images(const LoadedJob& job, GlossyBtf& glossy, const std::string& path,
+                        const std::function<void(int view, std::span<const uint16_t> images)>& on_view);
 
 // A factored file, read and checked. Throws Error for anything else.
 struct StoredBtf {

@@ -1,6 +1,7 @@
 // "measure": {"kind": "btf", ...} and {"kind": "light_field", ...}
 #include <algorithm>
 
+#include "base/error.h"
 #include "base/half.h"
 #include "server/btf_file.h"
 #include "server/canonical.h"
@@ -98,14 +99,18 @@ size_t nearest(const std::vector<AnglesDeg>& directions, const AnglesDeg& wanted
            directions.begin();
 }
 
-// For looking: from the view nearest the normal, under the light nearest 45 degrees from the upper left;
-// white is a white plane.
-void write_preview(const LoadedJob& job, const Btf& btf, const std::string& path) {
-    const BtfPlan& plan = pictures_of(job);
-    const BtfShape& shape = btf.shape;
-    const size_t view = nearest(btf.mean.outgoing, {0, 0}), light = nearest(plan.incident, {45, 135});
-    std::vector<uint16_t> images(shape.images_size() / shape.n_views);
-    expand_view(shape, btf.radiance, btf.view_maps, static_cast<int>(view), images);
+// For looking: the view nearest the normal, or the middle camera.
+size_t preview_view(const BtfPlan& plan) {
+    if (plan.cameras)
+        return static_cast<size_t>(plan.cameras->n_v / 2) * plan.cameras->n_u + plan.cameras->n_u / 2;
+    return nearest(plan.outgoing, {0, 0});
+}
+
+// images: [light][channel][pixel] of that view. Under the light nearest 45 degrees from the upper left; white
+// is a white plane.
+void write_preview(const LoadedJob& job, const BtfShape& shape, const std::vector<uint16_t>& images,
+                   const std::string& path) {
+    const size_t light = nearest(pictures_of(job).incident, {45, 135});
     PngChannels picture;
     picture.width = shape.pixels_x;
     picture.height = shape.pixels_y;
@@ -121,8 +126,46 @@ void write_preview(const LoadedJob& job, const Btf& btf, const std::string& path
     write_png_picture(picture, path);
 }
 
+void write_means(const LoadedJob& job, const Table& mean, const OutputRequest& file) {
+    Table table = mean;
+    const auto origin = job_provenance(job);
+    table.provenance.insert(table.provenance.begin(), origin.begin(), origin.end());
+    write_table(table, file.format, file.path);
+}
+
+// What the facets send back depends on the view.
+Report run_glossy(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
+                  const Monitor& monitor) {
+    for (const OutputRequest& file : files)
+        if (file.format == "btf")
+            throw Error(ErrorCode::invalid_input, "/output", "btf",
+                        "the factored form holds one radiance for each facet and light, and a glossy facet "
+                        "sends another to every view: ask for \"images\"");
+    const BtfPlan& plan = pictures_of(job);
+    GlossyBtf glossy(job.surface.surface, job.material, plan, options, monitor);
+    const int shown = static_cast<int>(preview_view(plan));
+    std::vector<uint16_t> preview;
+    const auto keep_preview = [&](int view, std::span<const uint16_t> images) {
+        if (view == shown) preview.assign(images.begin(), images.end());
+    };
+    std::optional<Btf> btf;
+    for (const OutputRequest& file : files)
+        if (file.format == "images") btf = write_glossy_images(job, glossy, file.path, keep_preview);
+    if (!btf) btf = glossy.pictures(keep_preview);
+    btf->mean.provenance = glossy.report().settings;
+    for (const OutputRequest& file : files) {
+        monitor.check_cancelled();
+        if (file.format == "png")
+            write_preview(job, btf->shape, preview, file.path);
+        else if (file.format != "images")
+            write_means(job, btf->mean, file);
+    }
+    return glossy.report();
+}
+
 Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
            const Monitor& monitor) {
+    if (!pure_lambertian(job.material)) return run_glossy(job, files, options, monitor);
     BtfResult result = measure_btf(job.surface.surface, job.material, pictures_of(job), options, monitor);
     Table& mean = result.btf.mean;
     mean.provenance = result.report.settings;
@@ -133,15 +176,22 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
         } else if (file.format == "images") {
             write_btf_images(job, result.btf, file.path, monitor);
         } else if (file.format == "png") {
-            write_preview(job, result.btf, file.path);
+            const BtfShape& shape = result.btf.shape;
+            std::vector<uint16_t> images(shape.images_size() / shape.n_views);
+            expand_view(shape, result.btf.radiance, result.btf.view_maps,
+                        static_cast<int>(preview_view(pictures_of(job))), images);
+            write_preview(job, shape, images, file.path);
         } else {
-            Table table = mean;
-            const auto origin = job_provenance(job);
-            table.provenance.insert(table.provenance.begin(), origin.begin(), origin.end());
-            write_table(table, file.format, file.path);
+            write_means(job, mean, file);
         }
     }
     return std::move(result.report);
+}
+
+// Pictures in their smaller form, where there is one.
+bool is_served(const LoadedJob& job, const std::string& format) {
+    const bool has_factored_form = pure_lambertian(job.material) != nullptr;
+    return format != (has_factored_form ? "images" : "btf");
 }
 
 }  // namespace
@@ -155,7 +205,9 @@ MeasureKind btf_kind() {
             },
             [](const MeasurePlan& plan) { return canonical_plan(std::get<BtfPlan>(plan), "btf"); },
             predict,
-            run};
+            run,
+            false,
+            is_served};
 }
 
 MeasureKind light_field_kind() {
@@ -168,7 +220,9 @@ MeasureKind light_field_kind() {
         },
         [](const MeasurePlan& plan) { return canonical_plan(std::get<LightFieldPlan>(plan), "light_field"); },
         predict,
-        run};
+        run,
+        false,
+        is_served};
 }
 
 }  // namespace gonio

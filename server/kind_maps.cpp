@@ -1,13 +1,16 @@
 // "measure": {"kind": "maps", ...}
 #include <algorithm>
 #include <cmath>
+#include <ostream>
 
+#include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/text.h"
 #include "server/array_file.h"
 #include "server/canonical.h"
 #include "server/job_sections.h"
 #include "server/measure_kind.h"
+#include "server/npy_file.h"
 #include "table/io/image_io.h"
 
 namespace gonio {
@@ -54,12 +57,19 @@ const char* const quantity =
     "upper "
     "hemisphere that is seen (1 on a plane). One pixel a cell, the mean of its facets by projected area";
 
+// Behind it, where what leaves a facet depends on the view.
+const char* const quantity_of_glossy =
+    ". The facets are glossy: direct, indirect, total are irradiances (of what arrives) over that of the "
+    "flat "
+    "base plane";
+
 using Attributes = std::vector<std::pair<std::string, std::string>>;
 
 Attributes attributes_of(const LoadedJob& job, const MapsResult& result) {
     Attributes attributes = job_provenance(job);
     attributes.insert(attributes.end(), result.report.settings.begin(), result.report.settings.end());
-    attributes.emplace_back("quantity", quantity);
+    attributes.emplace_back(
+        "quantity", pure_lambertian(job.material) ? quantity : std::string(quantity) + quantity_of_glossy);
     const auto& plan = std::get<MapsPlan>(job.job.plan);
     const auto name_directions = [&](const std::string& what, const std::vector<AnglesDeg>& directions) {
         for (size_t k = 0; k < directions.size(); ++k)
@@ -117,19 +127,41 @@ void write_sheet(const LoadedJob& job, const MapsResult& result, const std::stri
     write_png_picture(sheet, path);
 }
 
-void write_arrays(const LoadedJob& job, const MapsResult& result, const std::string& path) {
-    const Maps& maps = result.maps;
+// What the numbers are, and the mean of every layer.
+nlohmann::ordered_json head_of(const LoadedJob& job, const MapsResult& result) {
     nlohmann::ordered_json head{{"format", "gonio maps"}, {"version", 1}};
     for (const auto& [key, value] : attributes_of(job, result)) head[key] = value;
     head["pixel_pitch_m"] = {job.surface.surface.pitch_x, job.surface.surface.pitch_y};
     head["first_pixel"] = "row 0 at low y, column 0 at low x";
-    nlohmann::ordered_json names = nlohmann::ordered_json::array();
-    for (const MapLayer& layer : maps.layers) names.push_back(layer.name);
+    nlohmann::ordered_json names = nlohmann::ordered_json::array(), means = names, errors = names;
+    for (const MapLayer& layer : result.maps.layers) {
+        names.push_back(layer.name);
+        means.push_back(layer.mean);
+        errors.push_back(layer.se);
+    }
     head["layers"] = names;
-    const std::vector<ArraySection> sections = {
-        {"maps", "<f4", {maps.layers.size(), static_cast<size_t>(maps.ny), static_cast<size_t>(maps.nx)}}};
-    write_array_file(path, std::move(head), sections, [&](ArrayWriter& writer) {
-        for (const MapLayer& layer : maps.layers) writer.append(std::span<const float>(layer.pixels));
+    head["mean"] = means;
+    head["pixel_se"] = errors;
+    return head;
+}
+
+std::vector<size_t> shape_of(const Maps& maps) {
+    return {maps.layers.size(), static_cast<size_t>(maps.ny), static_cast<size_t>(maps.nx)};
+}
+
+void write_arrays(const LoadedJob& job, const MapsResult& result, const std::string& path) {
+    write_array_file(path, head_of(job, result), {{"maps", "<f4", shape_of(result.maps)}},
+                     [&](ArrayWriter& writer) {
+                         for (const MapLayer& layer : result.maps.layers)
+                             writer.append(std::span<const float>(layer.pixels));
+                     });
+}
+
+void write_npy(const LoadedJob& job, const MapsResult& result, const std::string& path) {
+    write_npy_file(path, "'<f4'", shape_of(result.maps), head_of(job, result), [&](std::ostream& out) {
+        for (const MapLayer& layer : result.maps.layers)
+            out.write(reinterpret_cast<const char*>(layer.pixels.data()),
+                      static_cast<std::streamsize>(layer.pixels.size() * sizeof(float)));
     });
 }
 
@@ -143,6 +175,11 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
             write_exr(job, result, file.path);
         else if (file.format == "png")
             write_sheet(job, result, file.path);
+        else if (file.format == "npy")
+            write_npy(job, result, file.path);
+        else if (file.format == "json")
+            write_file_atomically(file.path,
+                                  [&](std::ostream& out) { out << head_of(job, result).dump(1) << "\n"; });
         else
             write_arrays(job, result, file.path);
     }
@@ -152,7 +189,7 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
 }  // namespace
 
 MeasureKind maps_kind() {
-    return {"maps", "maps", {"exr", "png", "arrays"}, parse, canonical_plan, predict, run};
+    return {"maps", "maps", {"exr", "png", "arrays", "npy", "json"}, parse, canonical_plan, predict, run};
 }
 
 }  // namespace gonio

@@ -9,6 +9,7 @@
 #include "server/canonical.h"
 #include "server/job_sections.h"
 #include "server/measure_kind.h"
+#include "server/npy_file.h"
 #include "table/io/image_io.h"
 
 namespace gonio {
@@ -135,6 +136,11 @@ nlohmann::ordered_json means_of(const LoadedJob& job, const RelightResult& resul
     return head;
 }
 
+std::vector<size_t> images_shape(const Relit& relit) {
+    const auto size = [](int n) { return static_cast<size_t>(n); };
+    return {size(relit.n_views), size(relit.n_channels), size(relit.pixels_y), size(relit.pixels_x)};
+}
+
 void write_csv(const LoadedJob& job, const RelightResult& result, const std::string& path) {
     const Relit& relit = result.relit;
     const auto& views = std::get<RelightPlan>(job.job.plan).outgoing;
@@ -151,15 +157,19 @@ void write_csv(const LoadedJob& job, const RelightResult& result, const std::str
     write_file_atomically(path, [&](std::ostream& out) { out << text; });
 }
 
+void write_npy(const LoadedJob& job, const RelightResult& result, const std::string& path) {
+    write_npy_file(path, "'<f4'", images_shape(result.relit), means_of(job, result), [&](std::ostream& out) {
+        out.write(reinterpret_cast<const char*>(result.relit.images.data()),
+                  static_cast<std::streamsize>(result.relit.images.size() * sizeof(float)));
+    });
+}
+
 // Everything: means in the first line, then the images and the radiance of every facet part.
 void write_arrays(const LoadedJob& job, const RelightResult& result, const std::string& path) {
     const Relit& relit = result.relit;
-    const auto size = [](int n) { return static_cast<size_t>(n); };
     const std::vector<ArraySection> sections = {
-        {"images",
-         "<f4",
-         {size(relit.n_views), size(relit.n_channels), size(relit.pixels_y), size(relit.pixels_x)}},
-        {"facet_radiance", "<f4", {size(relit.n_channels), relit.n_facets}}};
+        {"images", "<f4", images_shape(relit)},
+        {"facet_radiance", "<f4", {static_cast<size_t>(relit.n_channels), relit.n_facets}}};
     write_array_file(path, means_of(job, result), sections, [&](ArrayWriter& writer) {
         writer.append(std::span<const float>(relit.images));
         writer.append(std::span<const float>(relit.radiance));
@@ -181,6 +191,8 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
         else if (file.format == "json")
             write_file_atomically(file.path,
                                   [&](std::ostream& out) { out << means_of(job, result).dump(1) << "\n"; });
+        else if (file.format == "npy")
+            write_npy(job, result, file.path);
         else
             write_arrays(job, result, file.path);
     }
@@ -190,8 +202,9 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
 }  // namespace
 
 MeasureKind relight_kind() {
-    return {"relight", "relight", {"csv", "json", "exr", "png", "arrays"}, parse, canonical_plan, predict,
-            run,       true};
+    return {
+        "relight", "relight", {"csv", "json", "exr", "png", "arrays", "npy"}, parse, canonical_plan, predict,
+        run,       true};
 }
 
 }  // namespace gonio

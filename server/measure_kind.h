@@ -32,6 +32,8 @@ struct MeasureKind {
                   const Monitor& monitor);
     // Whether it takes the "environment" of the job for its light, and needs one.
     bool under_environment = false;
+    // Whether the service keeps this job's product in a format of its process; null: in all of them.
+    bool (*is_served)(const LoadedJob& job, const std::string& format) = nullptr;
 };
 
 // In the order of the alternatives of MeasurePlan.

@@ -9,7 +9,9 @@
 #include "directions/spherical_harmonics.h"
 #include "fitting/joint_basis.h"
 #include "server/canonical.h"
+#include "server/npy_file.h"
 #include "table/io/formats.h"
+#include "table/io/image_io.h"
 
 namespace gonio {
 namespace {
@@ -122,15 +124,17 @@ ordered_json head(const HarmonicProjection& projection) {
     return root;
 }
 
-void write_json_projection(const HarmonicProjection& projection, std::ostream& out) {
+void write_json_projection(const HarmonicProjection& projection, const std::string& path) {
     ordered_json root = head(projection);
     root["coefficients"] = projection.coefficients;
     root["standard_error"] = projection.se;
     root["bias"] = projection.bias;
-    out << root.dump(-1, ' ', false, ordered_json::error_handler_t::replace) << "\n";
+    write_file_atomically(path, [&](std::ostream& out) {
+        out << root.dump(-1, ' ', false, ordered_json::error_handler_t::replace) << "\n";
+    });
 }
 
-void write_csv_projection(const HarmonicProjection& projection, std::ostream& out) {
+void write_csv(const HarmonicProjection& projection, std::ostream& out) {
     BlockWriter writer(out);
     const ProjectionPlan& plan = projection.plan;
     writer.text() += "# gonio projection, version " + std::to_string(format_version) + "\n";
@@ -176,29 +180,57 @@ void write_csv_projection(const HarmonicProjection& projection, std::ostream& ou
     writer.flush();
 }
 
-void write_npy_projection(const HarmonicProjection& projection, std::ostream& out) {
+void write_csv_projection(const HarmonicProjection& projection, const std::string& path) {
+    write_file_atomically(path, [&](std::ostream& out) { write_csv(projection, out); });
+}
+
+void write_npy_projection(const HarmonicProjection& projection, const std::string& path) {
     const ordered_json described = head(projection);
-    std::string shape;
-    for (const auto& extent : described["shape"]) shape += extent.dump() + ", ";
-    std::string header =
-        "{'descr': [('value', '<f8'), ('se', '<f8'), ('bias', '<f8')], 'fortran_order': False, 'shape': (" +
-        shape + "), }";
-    constexpr size_t magic = 10, alignment = 64;
-    while ((magic + header.size() + 1) % alignment != 0) header += ' ';
-    header += '\n';
-    const auto length = static_cast<uint16_t>(header.size());
-    out << "\x93NUMPY" << '\x01' << '\x00' << static_cast<char>(length & 0xff)
-        << static_cast<char>(length >> 8) << header;
-    for (size_t k = 0; k < projection.coefficients.size(); ++k)
-        for (const auto* values : {&projection.coefficients, &projection.se, &projection.bias})
-            out.write(reinterpret_cast<const char*>(&(*values)[k]), sizeof(double));
-    out << described.dump(-1, ' ', false, ordered_json::error_handler_t::replace) << "\n";
+    write_npy_file(
+        path, "[('value', '<f8'), ('se', '<f8'), ('bias', '<f8')]",
+        described["shape"].get<std::vector<size_t>>(), described, [&](std::ostream& out) {
+            for (size_t k = 0; k < projection.coefficients.size(); ++k)
+                for (const auto* values : {&projection.coefficients, &projection.se, &projection.bias})
+                    out.write(reinterpret_cast<const char*>(&(*values)[k]), sizeof(double));
+        });
+}
+
+// A row of pixels a set of coefficients, the first set at the top; a layer an order of scattering.
+void write_exr_projection(const HarmonicProjection& projection, const std::string& path) {
+    const ordered_json described = head(projection);
+    Picture picture;
+    picture.width = static_cast<int>(projection.n_coefficients());
+    picture.height = static_cast<int>(projection.n_sets());
+    for (const auto& [key, value] : described.items())
+        if (key != "provenance")
+            picture.attributes.emplace_back(key, value.is_string() ? value.get<std::string>() : value.dump());
+    picture.attributes.insert(picture.attributes.end(), projection.provenance.begin(),
+                              projection.provenance.end());
+    for (size_t channel = 0; channel < projection.channels.size(); ++channel)
+        for (size_t slice = 0; slice < projection.slices(); ++slice) {
+            const std::string layer = slice == 0 ? "" : "order" + std::to_string(slice) + ".";
+            const auto add = [&](const std::string& what, const std::vector<double>& values) {
+                std::vector<float> pixels;
+                for (size_t row = projection.n_sets(); row-- > 0;) {  // row 0 of a picture is the lowest
+                    const auto from =
+                        values.begin() + static_cast<long>(projection.set_index(channel, slice, row) *
+                                                           projection.n_coefficients());
+                    pixels.insert(pixels.end(), from, from + picture.width);
+                }
+                picture.channels.push_back(
+                    {layer + what + exr_channel_name(projection.channels[channel]), std::move(pixels)});
+            };
+            add("", projection.coefficients);
+            add("se.", projection.se);
+            add("bias.", projection.bias);
+        }
+    write_exr_picture(picture, path);
 }
 
 }  // namespace
 
 const std::vector<std::string>& projection_formats() {
-    static const std::vector<std::string> formats = {"csv", "json", "npy"};
+    static const std::vector<std::string> formats = {"csv", "json", "npy", "exr"};
     return formats;
 }
 
@@ -207,11 +239,12 @@ void write_projection(const HarmonicProjection& projection, const std::string& f
     const auto write = format == "csv"    ? write_csv_projection
                        : format == "json" ? write_json_projection
                        : format == "npy"  ? write_npy_projection
+                       : format == "exr"  ? write_exr_projection
                                           : nullptr;
     if (!write)
         throw Error(ErrorCode::invalid_input, "format", format,
-                    "a projection is written as csv, json or npy");
-    write_file_atomically(path, [&](std::ostream& out) { write(projection, out); });
+                    "a projection is written as csv, json, npy or exr");
+    write(projection, path);
 }
 
 void add_to_report(const HarmonicProjection& projection, Report& report) {

@@ -8,13 +8,14 @@
 
 namespace gonio {
 
-// "csv", "json", "npy".
+// "csv", "json", "npy", "exr".
 const std::vector<std::string>& projection_formats();
 
 // Whole or not at all; folders must be there. Each file carries the conventions, how it was fitted and the
-// provenance; an .npy file does so behind its array, where NumPy does not look: one line of JSON, the head of
-// the JSON file. Its elements have the fields value, se and bias. Throws Error(io), Error(invalid_input) for
-// an unknown format.
+// provenance; an .npy file as in npy_file.h: the head of the JSON file. Its elements have the fields value,
+// se and bias. An OpenEXR file has a pixel a coefficient and a row a set of them, in channels Y, se.Y, bias.Y
+// (of separate orders also order1.Y and so on), in single precision. Throws Error(io), Error(invalid_input)
+// for an unknown format.
 void write_projection(const HarmonicProjection& projection, const std::string& format,
                       const std::string& path);
 

@@ -18,8 +18,10 @@ using nlohmann::json;
 constexpr OutputFormat table_outputs[] = {
     {"csv", "text/csv"}, {"json", "application/json"}, {"exr", "image/x-exr"}};
 
-constexpr OutputFormat projection_outputs[] = {
-    {"csv", "text/csv"}, {"json", "application/json"}, {"npy", "application/octet-stream"}};
+constexpr OutputFormat projection_outputs[] = {{"csv", "text/csv"},
+                                               {"json", "application/json"},
+                                               {"npy", "application/octet-stream"},
+                                               {"exr", "image/x-exr"}};
 
 std::vector<ProcessOutput> brdf_outputs() {
     return {
@@ -105,7 +107,7 @@ ServiceProcess brdf_process() {
             "BRDF of a height field",
             "Shadowing, masking and every order of diffuse scattering, each value with its standard error "
             "and bias.",
-            {"surface", "material", "measure", "accuracy"},
+            {"surface", "base", "material", "measure", "accuracy"},
             {"surface", "material", "measure"},
             json::object(),
             brdf_outputs(),

@@ -1,4 +1,6 @@
 // The process of a kind of measurement (server/measure_kind.h) that writes its product itself.
+#include <vector>
+
 #include "server/measure_kind.h"
 #include "server/result_json.h"
 #include "server/service/processes.h"
@@ -19,8 +21,13 @@ PreparedJob prepare(const json& document, const ServiceProcess& process, Objects
     PreparedJob prepared;
     prepared.job_hash = loaded->hash;
     prepared.surfaces = files.surfaces;
-    prepared.prediction = kind_of(loaded->job.plan).predict(*loaded);
-    prepared.run = [loaded, product = process.outputs.front()](const Workplace& place) {
+    const MeasureKind& kind = kind_of(loaded->job.plan);
+    prepared.prediction = kind.predict(*loaded);
+    ProcessOutput served = process.outputs.front();
+    if (kind.is_served)
+        std::erase_if(served.formats,
+                      [&](const OutputFormat& format) { return !kind.is_served(*loaded, format.suffix); });
+    prepared.run = [loaded, product = std::move(served)](const Workplace& place) {
         const TemporaryFolder folder;
         std::vector<OutputRequest> requests;
         for (const OutputFormat& format : product.formats)
@@ -55,7 +62,7 @@ ServiceProcess measurement_process(const MeasureKind& kind, const std::string& t
     ServiceProcess process{kind.name,
                            title,
                            description,
-                           {"surface", "material", "measure", "accuracy"},
+                           {"surface", "base", "material", "measure", "accuracy"},
                            {"surface", "material", "measure"},
                            json::object(),
                            {{kind.output, product, std::move(formats)},
@@ -67,7 +74,7 @@ ServiceProcess measurement_process(const MeasureKind& kind, const std::string& t
         return prepare(document, process, objects);
     };
     if (kind.under_environment) {
-        process.inputs.insert(process.inputs.begin() + 2, "environment");
+        process.inputs.insert(process.inputs.begin() + 3, "environment");
         process.required.insert(process.required.begin() + 2, "environment");
     }
     return process;

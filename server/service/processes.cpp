@@ -18,20 +18,28 @@ const std::vector<ServiceProcess>& service_processes() {
         statistics_process(),
         measurement_process(btf_kind(), "Bidirectional texture function of a height field",
                             "What a camera sees of every place of the base plane, for all lights and views.",
-                            "radiance of every facet and which facet each pixel shows; a picture; the means",
+                            "radiance of every facet and which facet each pixel shows, or, of glossy facets, "
+                            "all images; a picture; the means",
                             {{"btf", "application/octet-stream"},
+                             {"images", "application/octet-stream"},
                              {"png", "image/png"},
                              {"csv", "text/csv"},
                              {"json", "application/json"}}),
         measurement_process(light_field_kind(), "Light field of a height field",
                             "Radiance over position and direction, or over two planes.",
-                            "radiance of every facet and which facet each pixel shows; a picture",
-                            {{"btf", "application/octet-stream"}, {"png", "image/png"}}),
-        measurement_process(
-            maps_kind(), "Light, shadow and sky on a height field",
-            "Direct, indirect and total light, shadow, masking and sky, one pixel a cell.",
-            "all layers, and a sheet of them",
-            {{"exr", "image/x-exr"}, {"png", "image/png"}, {"arrays", "application/octet-stream"}}),
+                            "radiance of every facet and which facet each pixel shows, or, of glossy facets, "
+                            "all images; a picture",
+                            {{"btf", "application/octet-stream"},
+                             {"images", "application/octet-stream"},
+                             {"png", "image/png"}}),
+        measurement_process(maps_kind(), "Light, shadow and sky on a height field",
+                            "Direct, indirect and total light, shadow, masking and sky, one pixel a cell.",
+                            "all layers, and a sheet of them",
+                            {{"exr", "image/x-exr"},
+                             {"png", "image/png"},
+                             {"arrays", "application/octet-stream"},
+                             {"npy", "application/octet-stream"},
+                             {"json", "application/json"}}),
         measurement_process(
             relight_kind(), "A height field under an environment",
             "Radiance under light from all around: images, facets, and means over the surface.",
@@ -40,7 +48,8 @@ const std::vector<ServiceProcess>& service_processes() {
              {"json", "application/json"},
              {"exr", "image/x-exr"},
              {"png", "image/png"},
-             {"arrays", "application/octet-stream"}}),
+             {"arrays", "application/octet-stream"},
+             {"npy", "application/octet-stream"}}),
     };
     return processes;
 }

@@ -51,7 +51,14 @@ void write_all(std::string_view bytes) {
     }
 }
 
-json head_of(const RawHeights& heights) {
+template <class Number>
+void answer(const json& head, const std::vector<Number>& numbers) {
+    write_all(head.dump() + "\n");
+    write_all({reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(Number)});
+}
+
+void answer_heights(const FileBytes& file) {
+    const RawHeights heights = decode_heights(file, untrusted_limits);
     json head{{"nx", heights.nx},
               {"ny", heights.ny},
               {"row0_at_top", heights.row0_at_top},
@@ -62,7 +69,12 @@ json head_of(const RawHeights& heights) {
     if (heights.pitch_x) head["pitch_x"] = *heights.pitch_x;
     if (heights.pitch_y) head["pitch_y"] = *heights.pitch_y;
     if (heights.height_unit) head["height_unit"] = *heights.height_unit;
-    return head;
+    answer(head, heights.values);
+}
+
+void answer_radiance(const FileBytes& file) {
+    const RadianceImage image = decode_radiance_image(file, untrusted_limits);
+    answer({{"nx", image.nx}, {"ny", image.ny}, {"n_channels", image.n_channels}}, image.values);
 }
 
 // ---- the parent: what comes back is a stranger's, too
@@ -72,22 +84,49 @@ std::optional<double> optional_number(const JsonNode& head, const char* key) {
     return node ? std::optional(node->number()) : std::nullopt;
 }
 
-RawHeights heights_from(const std::string& path, const std::string& output) {
-    const size_t end = output.find('\n');
-    if (end == std::string::npos || end > longest_head)
+// One line of JSON, and numbers behind it.
+struct Answer {
+    std::string path, output;
+    size_t line_end = 0;
+    json head;
+
+    template <class Number>
+    std::vector<Number> numbers(size_t n) const {
+        if (output.size() - line_end - 1 != n * sizeof(Number))
+            throw Error(ErrorCode::invalid_input, path, "",
+                        "the process that was to decode it ended early: damaged");
+        std::vector<Number> values(n);
+        std::memcpy(values.data(), output.data() + line_end + 1, n * sizeof(Number));
+        return values;
+    }
+};
+
+Answer checked_answer(const std::string& path, std::string output) {
+    Answer answer{path, std::move(output), 0, {}};
+    answer.line_end = answer.output.find('\n');
+    if (answer.line_end == std::string::npos || answer.line_end > longest_head)
         throw Error(ErrorCode::invalid_input, path, "",
                     "the process that was to decode it was killed: damaged");
-    const json parsed = parse_json_strictly({output.data(), end}, {longest_head, 4});
-    const JsonNode head(parsed);
+    answer.head = parse_json_strictly({answer.output.data(), answer.line_end}, {longest_head, 4});
+    const JsonNode head(answer.head);
     if (head.has("refused")) {
         const JsonNode refused = head.at("refused");
         throw Error(
             static_cast<ErrorCode>(refused.at("code").whole_number(0, static_cast<int>(ErrorCode::internal))),
             path, refused.at("value").raw().get<std::string>(), refused.at("allowed").text());
     }
+    return answer;
+}
+
+int extent(const JsonNode& node) {
+    return static_cast<int>(node.whole_number(1, untrusted_limits.max_points));
+}
+
+RawHeights heights_from(const Answer& answer) {
+    const JsonNode head(answer.head);
     RawHeights heights;
-    heights.nx = static_cast<int>(head.at("nx").whole_number(1, 1 << 26));
-    heights.ny = static_cast<int>(head.at("ny").whole_number(1, 1 << 26));
+    heights.nx = extent(head.at("nx"));
+    heights.ny = extent(head.at("ny"));
     heights.row0_at_top = head.at("row0_at_top").boolean();
     heights.bits = static_cast<int>(head.at("bits").whole_number(0, 64));
     heights.integer_max = head.at("integer_max").number();
@@ -96,23 +135,28 @@ RawHeights heights_from(const std::string& path, const std::string& output) {
     heights.pitch_y = optional_number(head, "pitch_y");
     heights.height_unit = optional_number(head, "height_unit");
     for (const json& note : head.at("notes").raw()) heights.notes.push_back(note.get<std::string>());
-    const size_t bytes = static_cast<size_t>(heights.nx) * heights.ny * sizeof(double);
-    if (output.size() - end - 1 != bytes)
-        throw Error(ErrorCode::invalid_input, path, "",
-                    "the process that was to decode it ended early: damaged");
-    heights.values.resize(bytes / sizeof(double));
-    std::memcpy(heights.values.data(), output.data() + end + 1, bytes);
+    heights.values = answer.numbers<double>(static_cast<size_t>(heights.nx) * heights.ny);
     return heights;
 }
 
-std::string output_of_child(const std::string& path) {
+RadianceImage radiance_from(const Answer& answer) {
+    const JsonNode head(answer.head);
+    RadianceImage image;
+    image.nx = extent(head.at("nx"));
+    image.ny = extent(head.at("ny"));
+    image.n_channels = static_cast<int>(head.at("n_channels").whole_number(1, 3));
+    image.values = answer.numbers<float>(static_cast<size_t>(image.n_channels) * image.nx * image.ny);
+    return image;
+}
+
+Answer answer_of_child(const std::string& content, const std::string& path) {
     int ends[2];
     if (::pipe2(ends, O_CLOEXEC) != 0) throw Error(ErrorCode::io, path, "", "no pipe to be had");
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, ends[1], STDOUT_FILENO);
-    std::string program = "/proc/self/exe", command = "decode-untrusted", file = path;
-    char* const arguments[] = {program.data(), command.data(), file.data(), nullptr};
+    std::string program = "/proc/self/exe", command = "decode-untrusted", what = content, file = path;
+    char* const arguments[] = {program.data(), command.data(), what.data(), file.data(), nullptr};
     // Nothing of ours to read there, and no threads of a library that it does not need.
     std::string one_thread = "OPENBLAS_NUM_THREADS=1";
     char* const environment[] = {one_thread.data(), nullptr};
@@ -136,7 +180,7 @@ std::string output_of_child(const std::string& path) {
     int status = 0;
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
-    return status == 0 ? output : "";
+    return checked_answer(path, status == 0 ? std::move(output) : "");
 }
 
 }  // namespace
@@ -159,17 +203,14 @@ void give_up_system_calls() {
     if (!ok) throw Error(ErrorCode::internal, "", "", "the system has no seccomp filter");
 }
 
-int decode_untrusted(const std::string& path) {
+int decode_untrusted(const std::string& content, const std::string& path) {
     try {
         const std::string bytes = bytes_of_file(path);
         set_limit(RLIMIT_CPU, child_seconds);
         set_limit(RLIMIT_AS, child_bytes);
         set_limit(RLIMIT_CORE, 0);
         give_up_system_calls();
-        const RawHeights heights = decode_heights({path, bytes}, untrusted_limits);
-        write_all(head_of(heights).dump() + "\n");
-        write_all(
-            {reinterpret_cast<const char*>(heights.values.data()), heights.values.size() * sizeof(double)});
+        content == "radiance" ? answer_radiance({path, bytes}) : answer_heights({path, bytes});
     } catch (const Error& error) {
         const json refused{
             {"code", static_cast<int>(error.code())}, {"value", error.value()}, {"allowed", error.allowed()}};
@@ -181,15 +222,13 @@ int decode_untrusted(const std::string& path) {
 }
 
 RawHeights read_untrusted_heights(const std::string& path) {
-    return is_untrusted_format(path) ? heights_from(path, output_of_child(path))
+    return is_untrusted_format(path) ? heights_from(answer_of_child("heights", path))
                                      : read_heights(path, untrusted_limits);
 }
 
 RadianceImage read_untrusted_radiance(const std::string& path) {
-    if (is_untrusted_format(path))
-        throw Error(ErrorCode::invalid_input, "/environment", "OpenEXR",
-                    "the service reads environments from Radiance .hdr files");
-    return read_radiance_image(path, untrusted_limits);
+    return is_untrusted_format(path) ? radiance_from(answer_of_child("radiance", path))
+                                     : read_radiance_image(path, untrusted_limits);
 }
 
 }  // namespace gonio

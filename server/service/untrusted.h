@@ -15,15 +15,15 @@ inline constexpr ReadLimits untrusted_limits{1LL << 26, 1LL << 30};
 // here. A child that breaks its limits or is killed is Error(invalid_input) naming the file.
 RawHeights read_untrusted_heights(const std::string& path);
 
-// A RadianceReader: Radiance .hdr alone, which is decoded here; OpenEXR is refused.
+// A RadianceReader: the same of images of radiance.
 RadianceImage read_untrusted_radiance(const std::string& path);
 
 // From here on this process has memory, the files that are open, and its end: a call that would open a file,
 // start a process or send anything kills it. Throws Error(internal) where the system has no seccomp filters.
 void give_up_system_calls();
 
-// The child's side: decodes the file after giving up everything else, writes the heights to standard output.
-// Returns the exit code.
-int decode_untrusted(const std::string& path);
+// The child's side: decodes the file after giving up everything else and writes its "heights" or "radiance",
+// whichever is its content, to standard output. Returns the exit code.
+int decode_untrusted(const std::string& content, const std::string& path);
 
 }  // namespace gonio
