@@ -2,6 +2,7 @@
 
 #include <httplib.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -161,6 +162,14 @@ json RemoteService::submit(const std::string& process, const json& inputs) {
 json RemoteService::status(const std::string& job) {
     Connection& c = *connection_;
     return c.ask_json([&] { return c.client.Get("/jobs/" + job, c.headers); });
+}
+
+bool RemoteService::has(const std::string& job, const std::string& output, const std::string& format) {
+    Connection& c = *connection_;
+    const json results = c.ask_json([&] { return c.client.Get("/jobs/" + job + "/results", c.headers); });
+    const json formats = results.value(output, json::array());
+    return std::any_of(formats.begin(), formats.end(),
+                       [&](const json& one) { return one.value("href", "").ends_with("?f=" + format); });
 }
 
 json RemoteService::wait(const std::string& job, const Monitor& monitor) {

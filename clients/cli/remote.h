@@ -30,6 +30,8 @@ class RemoteService {
     nlohmann::json wait(const std::string& job, const Monitor& monitor);
     nlohmann::json cancel(const std::string& job);
     nlohmann::json list(int limit);
+    // Whether a job that is done has this output in this format.
+    bool has(const std::string& job, const std::string& output, const std::string& format);
     // Output "table" in "csv", ...: goes on where a download broke, and holds it against its SHA-256.
     void fetch(const std::string& job, const std::string& output, const std::string& format,
                std::ostream& to);

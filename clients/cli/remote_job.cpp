@@ -54,8 +54,8 @@ SubmittedJob submit_job(RemoteService& service, const std::string& path) {
     SubmittedJob submitted{parse_job(text, {file.stem().string(), folder.string()}), {}};
     json inputs = parse_json_strictly(text);
     inputs.erase("output");
-    upload_files(service, inputs["surface"], folder);
-    upload_files(service, inputs["material"], folder);
+    for (const char* member : {"surface", "material", "environment"})
+        if (inputs.contains(member)) upload_files(service, inputs[member], folder);
     submitted.info = service.submit(inputs["measure"].value("kind", "brdf"), inputs);
     return submitted;
 }
@@ -91,7 +91,7 @@ int execute_remotely(const std::string& path, const RemoteOptions& remote, const
             write_file_atomically(target,
                                   [&](std::ostream& out) { service.fetch(id, product, format, out); });
         };
-        if (output.format == "images") {  // a service sends a BTF in its factored form
+        if (output.format == "images" && service.has(id, product, "btf")) {  // a twentieth of the bytes
             const TemporaryFolder folder;
             const std::string factored = (folder.path() / "factored").string();
             fetch_to(factored, "btf");

@@ -64,8 +64,9 @@ export function makeGroup(fields, pointer) {
     };
 }
 
-/** Groups of which one is chosen by a select: {name: {label, fields, constant}}; `constant` joins the value. */
-export function makeChoice(label, groups, pointer, chosen) {
+/** Groups of which one is chosen by a select: {name: {label, fields, constant, compose}}; `constant` joins the value,
+ *  `compose` makes the value of what the fields say. onChange(name) is told of every choice. */
+export function makeChoice(label, groups, pointer, chosen, onChange = () => {}) {
     const id = uniqueId("choice");
     const select = element("select", { id }, Object.entries(groups).map(([name, group]) =>
         element("option", { value: name, selected: name === chosen }, group.label)));
@@ -73,14 +74,22 @@ export function makeChoice(label, groups, pointer, chosen) {
     const error = element("p", { class: "error", id: `${id}-error` });
     select.setAttribute("aria-describedby", `${id}-error`);
     const shown = element("div");
-    const show = () => shown.replaceChildren(made[select.value].box);
+    const show = () => {
+        shown.replaceChildren(made[select.value].box);
+        onChange(select.value);
+    };
     select.addEventListener("change", show);
     show();
     return {
         box: element("div", { class: "alternatives" },
             element("div", { class: "field", "data-pointer": pointer },
                 element("label", { for: id }, label), element("div", { class: "controls" }, select), error), shown),
-        read: () => ({ ...groups[select.value].constant, ...made[select.value].read() }),
+        read: () => {
+            const { constant, compose } = groups[select.value];
+            const values = made[select.value].read();
+            return { ...constant, ...(compose ? compose(values) : values) };
+        },
+        chosen: () => select.value,
     };
 }
 

@@ -14,7 +14,9 @@ function describe(document) {
     if (!document) return null;
     const { surface, material } = document;
     if (!material) return "height map";
-    return `${surface.generate ? surface.generate.replaceAll("_", " ") : "height map"}, albedo ${JSON.stringify(material.albedo)}`;
+    const spaced = (name) => name.replaceAll("_", " ");
+    const facets = material.model === "lambertian" ? `albedo ${JSON.stringify(material.albedo)}` : spaced(material.model);
+    return `${surface.generate ? spaced(surface.generate) : "height map"}, ${facets}`;
 }
 
 async function showResult(box, info) {

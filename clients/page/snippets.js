@@ -6,7 +6,8 @@ function curlLines(info, document, formats) {
     const token = hasToken() ? ' -H "Authorization: Bearer $GONIO_TOKEN"' : "";
     const lines = [];
     if (document) {
-        if (document.surface.sha256) lines.push(`curl${token} -T height_map ${location.origin}/surfaces/${document.surface.sha256}`);
+        for (const [file, part] of [["height_map", document.surface], ["environment_map", document.environment]])
+            if (part?.sha256) lines.push(`curl${token} -T ${file} ${location.origin}/surfaces/${part.sha256}`);
         lines.push(`curl${token} -H 'Content-Type: application/json' -d '${JSON.stringify({ inputs: document })}' \\`,
             `     ${location.origin}/processes/${info.processID}/execution`);
     }

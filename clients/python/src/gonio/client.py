@@ -67,8 +67,8 @@ class Client:
                **members: Any) -> Job:
         """Hands in a job: a document (a mapping or the path of a JSON file), members given by name, or both.
 
-        A surface given as a file or as an array (`grid`) is uploaded, and so are albedo maps; `output` is left out, for
-        outputs are fetched. process: by default that of the kind of measurement.
+        A surface given as a file or as an array (`grid`) is uploaded, and so are maps of the material and of the
+        environment; `output` is left out, for outputs are fetched. process: by default that of the kind of measurement.
         However often this has to be tried, it makes one job. key: an Idempotency-Key of one's own: the same again,
         even from another process, is the same job. Raises ApiError with a pointer to what is wrong.
 

@@ -43,8 +43,9 @@ def read_document(job: JobDocument | None, members: Mapping[str, Any]) -> dict[s
 
 
 def file_members(document: dict[str, Any]) -> list[dict[str, Any]]:
-    """The parts of a document that may name files: the surface, and any number of the material."""
-    return [part for part in [document.get("surface"), *_objects(document.get("material"))] if isinstance(part, dict)]
+    """The parts of a document that may name files: the surface, the environment, and any number of the material."""
+    parts = [document.get("surface"), document.get("environment"), *_objects(document.get("material"))]
+    return [part for part in parts if isinstance(part, dict)]
 
 
 def _copied(value: Any) -> Any:
