@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "agreement/traced_sky.h"
 #include "base/random.h"
 #include "scattering/environment_slices.h"
 #include "scattering/path_tracer.h"
@@ -11,32 +12,12 @@
 namespace gonio {
 namespace {
 
-struct Traced {
-    double radiance = 0, se = 0;
-};
-Traced trace(const HeightField& surface, const Material& material, const Environment& sky, const Vec3& view,
-             long long paths, int max_order) {
+using test::Traced;
+
+PathTracerOptions with(long long paths, int max_order) {
     PathTracerOptions options;
     options.paths = paths, options.max_order = max_order;
-    const PathTracer tracer(surface, material, options);
-    double sum = 0, spread = 0;
-    for (int block = 0; block < tracer.blocks(); ++block) {
-        const PathTally tally = tracer.trace_environment(0, view, sky, block, {});
-        sum += tally.sum[0], spread += tally.squared_spread[0];
-    }
-    return {tracer.scale() * sum, tracer.scale() * std::sqrt(spread)};
-}
-
-// Bright to one side, and of no single harmonic of the azimuth.
-Environment uneven_sky() {
-    Environment sky;
-    sky.nx = 128, sky.ny = 64, sky.n_channels = 1, sky.rotation = 0.4;
-    for (int j = 0; j < sky.ny; ++j)
-        for (int i = 0; i < sky.nx; ++i) {
-            const double across = std::cos(2 * pi * (i - 40.5) / sky.nx) * std::sin(pi * (j + 0.5) / sky.ny);
-            sky.radiance.push_back(static_cast<float>(0.3 + std::exp(3 * across)));
-        }
-    return sky;
+    return options;
 }
 
 // The first order: irradiance from slices and what the view sees, at one random place inside the facets a
@@ -48,7 +29,7 @@ TEST(EnvironmentLight, SlicesAgreeWithThePathTracer) {
     const MarchGrid grid = make_march_grid(surface);
     const CellRect all{0, 0, surface.nx, surface.ny};
     const Tile tile = make_tile(surface, all, all, 1);
-    const Environment sky = uneven_sky();
+    const Environment sky = test::uneven_sky();
     const std::vector<Vec3> views{to_vector({0, 0}), to_vector({45, 30}), to_vector({70, 200})};
     std::vector<double> sum(views.size()), squares(views.size());
     for (int run = 0; run < runs; ++run) {
@@ -70,7 +51,8 @@ TEST(EnvironmentLight, SlicesAgreeWithThePathTracer) {
     }
     for (size_t v = 0; v < views.size(); ++v) {
         const double mean = sum[v] / runs, se = std::sqrt((squares[v] / runs - mean * mean) / (runs - 1));
-        const Traced traced = trace(surface, {{"y"}, Lambertian{albedo}}, sky, views[v], 60000, 1);
+        const Traced traced =
+            test::trace(surface, {{"y"}, Lambertian{albedo}}, sky, views[v], with(60000, 1));
         EXPECT_NEAR(mean, traced.radiance, 3.5 * std::hypot(se, traced.se)) << v;
         EXPECT_LT(std::hypot(se, traced.se), 0.01 * mean) << v;
     }
@@ -82,12 +64,12 @@ TEST(EnvironmentLight, FurnacesOfMirrorsAndLambertians) {
     const Material mirror{{"y"}, Mirror{{1.0, {}, {}}}}, white{{"y"}, Lambertian{1.0}};
     for (const Material& material : {mirror, white}) {
         const Traced traced =
-            trace(surface, material, uniform_environment({1}), to_vector({50, 20}), 4096, 0);
+            test::trace(surface, material, uniform_environment({1}), to_vector({50, 20}), with(4096, 0));
         EXPECT_NEAR(traced.radiance, 1, 2e-3) << "but for rays lost between facets";
     }
     // One bounce off a grey mirror: at most its reflectance, less what meets the relief again.
-    const Traced grey = trace(surface, {{"y"}, Mirror{{0.5, {}, {}}}}, uniform_environment({1}),
-                              to_vector({50, 20}), 20000, 1);
+    const Traced grey = test::trace(surface, {{"y"}, Mirror{{0.5, {}, {}}}}, uniform_environment({1}),
+                                    to_vector({50, 20}), with(20000, 1));
     EXPECT_LT(grey.radiance, 0.5);
     EXPECT_GT(grey.radiance, 0.35);
 }

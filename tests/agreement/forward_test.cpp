@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "agreement/measured.h"
 #include "agreement/photons.h"
 #include "base/error.h"
 #include "material/facet_brdf.h"
@@ -271,6 +272,48 @@ TEST(Forward, SameBitsOnAnyNumberOfThreads) {
     EXPECT_EQ(one.se, three.se);
 }
 
+// Where hardly a ray ends, runs that all found nothing agree with each other and are still wrong: the error
+// says so.
+TEST(Forward, CellsThatFewRaysReachAreNotSureToBeDark) {
+    const HeightField groove = generate_v_groove(16, 16e-6, 45);
+    const Material paint{{"y"}, Lambertian{0.8}};
+    BrdfPlan plan = cell_plan(equal_cells(12), {{20, 30}, {62, 205}}, 4, 12);
+    plan.separate_orders = true;
+    plan.max_order = 3;
+    const Table few = measure_brdf(groove, paint, plan, {}).table;
+    plan.accuracy.samples = Accuracy::Samples{1024, 64, 1, 12};
+    plan.accuracy.seed = 2;
+    const Table many = measure_brdf(groove, paint, plan, {}).table;
+    int empty = 0;
+    for (size_t k = 0; k < few.f.size(); ++k) {
+        empty += few.f[k] == 0 && many.f[k] > 0;
+        EXPECT_NEAR(few.f[k], many.f[k], 4.5 * std::hypot(few.se[k], many.se[k])) << k;
+    }
+    EXPECT_GT(empty, 0);
+}
+
+// Light that is still to and fro between two mirrors after the last order is no loss: it is left over, and
+// the table's bias holds it.
+TEST(Forward, WhatIsStillInsideIsSaid) {
+    const HeightField slot = generate_v_groove(8, 8e-6, 88.8);  // back up after 75 reflections
+    const std::vector<ReceiverCell> cells = equal_cells(30);
+    const Material material = perfect_mirror();
+    const MarchGrid march = make_march_grid(slot);
+    const ForwardScene scene(slot, march, material, cells);
+    ForwardSettings settings;
+    settings.sub_samples = {{0.3, 0.8}};
+    const ForwardTally tally = trace_light(scene, to_vector({0, 0}), settings, 1, 1, 0, {});
+    double left = 0;
+    for (const std::vector<double>& order : tally.share)
+        for (const double share : order) left += share;
+    EXPECT_GT(tally.remainder[0], 0.1);
+    EXPECT_NEAR(left + tally.remainder[0], 1, 1e-5);
+
+    const Table table = measure_brdf(slot, material, cell_plan(cells, {{0, 0}}), {}).table;
+    const float least = *std::min_element(table.bias.begin(), table.bias.end());
+    EXPECT_GT(least * pi, 0.5 * tally.remainder[0]);
+}
+
 // Large reliefs are started from some of their blocks: those of all phases together are the whole.
 TEST(Forward, BlocksAddUpToTheWhole) {
     const HeightField surface = rough(96, 96);
@@ -292,6 +335,25 @@ TEST(Forward, BlocksAddUpToTheWhole) {
     }
     for (size_t cell = 0; cell < cells.size(); ++cell)
         EXPECT_NEAR(sum[cell], whole.share[0][cell] * whole.projected, 1e-6);
+}
+
+// Every other block of 32 x 32 cells is flat, the others are grooved: runs that start from half of the blocks
+// see all of them in turn.
+TEST(Forward, RunsTakeTurnsInTheBlocks) {
+    constexpr int nx = 512, ny = 256;
+    std::vector<double> heights;
+    for (int j = 0; j < ny; ++j)
+        for (int i = 0; i < nx; ++i)
+            heights.push_back(i / 32 % 2 == 0 ? 0.0 : 0.3 * std::abs(i % 8 - 4) - 1.2);
+    heights[5 * nx + 5] = 1e-3;  // no row is another's image
+    BrdfPlan plan = cell_plan({{0, 20, -180, 180}, {20, 90, -180, 180}}, {{0, 0}});
+    plan.accuracy.samples.reset();
+    plan.accuracy.target_relative_error = 0.8;
+    const BrdfResult result =
+        measure_brdf(make_height_field(nx, ny, 1, 1, heights), perfect_mirror(), plan, {});
+    ASSERT_TRUE(was_skipped(result.report, "most facets as starting points"));
+    const double back = result.table.f[0] * projected_solid_angle(result.table.cells[0]);
+    EXPECT_NEAR(back, 0.5, 0.3);
 }
 
 // A relief of one column is simulated with its axes exchanged: what leaves must come back to where it
@@ -349,8 +411,10 @@ TEST(Forward, RefusesWhatItCannotAnswer) {
     const Material matte{{"y"}, Lambertian{0.5}};
     EXPECT_EQ(field_of(matte, directions), "/measure/transport");
     BrdfPlan cells = cell_plan(equal_cells(4), lights);
-    cells.transport = TransportKind::pair_graph;
-    EXPECT_EQ(field_of(matte, cells), "/measure/transport");
+    for (const TransportKind kind : {TransportKind::pair_graph, TransportKind::diffuse}) {
+        cells.transport = kind;
+        EXPECT_EQ(field_of(perfect_mirror(), cells), "/measure/transport");
+    }
 }
 
 }  // namespace

@@ -53,10 +53,50 @@ inline const Relief& relief(const std::string& name) {
 
 inline constexpr double albedo = 0.8;
 
-inline Material material() {
-    Lambertian lambertian;
-    lambertian.albedo = {albedo};
-    return {{"y"}, lambertian};
+inline Lobe microfacets(Microfacet::Distribution distribution, double alpha_x, double alpha_y) {
+    Microfacet m;
+    m.distribution = distribution;
+    m.alpha_x = alpha_x;
+    m.alpha_y = alpha_y;
+    m.rotation_deg = 25.0;
+    m.reflectance.reflectance = 1.0;
+    return m;
+}
+
+struct Facets {
+    const char* name;
+    Material material;
+};
+
+inline const std::vector<Facets> facets{
+    {"lambertian", {{"y"}, Lambertian{albedo}}},
+    {"ggx_0.3", {{"y"}, microfacets(Microfacet::Distribution::ggx, 0.3, 0.3)}},
+    {"ggx_0.15", {{"y"}, microfacets(Microfacet::Distribution::ggx, 0.15, 0.15)}},
+    {"brushed", {{"y"}, microfacets(Microfacet::Distribution::beckmann, 0.3, 0.6)}},
+    {"mixture",
+     [] {
+         Material mixture({"y"}, Lambertian{1.0});
+         mixture.lobes.front().weight = 0.5;
+         mixture.lobes.push_back({0.5, microfacets(Microfacet::Distribution::ggx, 0.2, 0.2)});
+         return mixture;
+     }()},
+    {"phong", {{"y"}, Phong{20.0, 0.9}}},
+    {"coated", {{"y"}, CoatedDiffuse{1.5, 0.3, 0.8}}}};
+
+inline const Material& material(const std::string& name = "lambertian") {
+    for (const Facets& f : facets)
+        if (name == f.name) return f.material;
+    throw std::runtime_error("no facets " + name);
+}
+
+// Reliefs with glossy facets that have a truth.
+inline const std::vector<std::pair<const char*, const char*>> glossy{
+    {"rough", "ggx_0.3"}, {"wavy", "ggx_0.15"},   {"hilly", "mixture"}, {"wavy", "brushed"},
+    {"rough", "coated"},  {"egg_crate", "phong"}, {"dunes", "ggx_0.3"}};
+
+// Where the truth of a relief with such facets is kept, without its ending.
+inline std::string truth_file(const std::string& relief, const std::string& facets_name = "lambertian") {
+    return "honest_" + relief + (facets_name == "lambertian" ? "" : "_" + facets_name);
 }
 
 // 16 lights over the hemisphere, 16 views to 80 degrees: no two directions alike, so no two values are.

@@ -1,8 +1,9 @@
 // Makes data/honest_NAME.json, the truth of honest_errors_test for the reliefs that have no closed form:
-//     cmake --build build/dev --target make_honest_references && build/dev/bin/make_honest_references NAME
-//     OUT.json
-// The fast engine at settings far beyond those that are judged (each facet in 16 parts, 8192 directions, 8
-// runs), cross-checked by long runs of the path tracer, which shares nothing with it. A minute or two each.
+//     cmake --build build/dev --target make_honest_references && build/dev/bin/make_honest_references RELIEF
+//     FACETS OUT.json
+// The fast engine at settings far beyond those that are judged (each facet in 16 parts; 8192 directions and 8
+// runs, or 2048 and 10 for glossy facets), cross-checked by long runs of the path tracer, which shares
+// nothing with it. A minute or two each.
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -15,11 +16,13 @@ using namespace gonio;
 
 namespace {
 
-// rms over the table of differences relative to the value.
+// rms over the table of differences relative to the value, or to a hundredth of the mean.
 double rms_relative(const std::vector<float>& difference_to, const std::vector<float>& f) {
-    double sum = 0;
+    double sum = 0, mean = 0;
+    for (const float value : f) mean += value / static_cast<double>(f.size());
     for (size_t k = 0; k < f.size(); ++k)
-        sum += std::pow(difference_to[k] / f[k], 2) / static_cast<double>(f.size());
+        sum += std::pow(difference_to[k] / std::max(static_cast<double>(f[k]), 0.01 * mean), 2) /
+               static_cast<double>(f.size());
     return std::sqrt(sum);
 }
 
@@ -46,27 +49,30 @@ nlohmann::json cross_check(const Table& reference, const Table& traced, long lon
 }  // namespace
 
 int main(int argc, char** argv) {
-    if (argc != 3) return std::fprintf(stderr, "usage: %s NAME OUT.json\n", argv[0]), 1;
+    if (argc != 4) return std::fprintf(stderr, "usage: %s RELIEF FACETS OUT.json\n", argv[0]), 1;
     const honest::Relief& field = honest::relief(argv[1]);
+    const Material& material = honest::material(argv[2]);
     const HeightField surface = field.make();
     BrdfPlan plan = honest::plan();
     plan.accuracy.seed = 1'000'003;
-    plan.accuracy.samples = Accuracy::Samples{16, 8192, 4, 8};
-    const BrdfResult result = measure_brdf(surface, honest::material(), plan, {});
+    plan.accuracy.samples =
+        pure_lambertian(material) ? Accuracy::Samples{16, 8192, 4, 8} : Accuracy::Samples{16, 2048, 4, 10};
+    const BrdfResult result = measure_brdf(surface, material, plan, {});
     const Table& table = result.table;
 
     BrdfPlan other = plan;
     other.accuracy.samples.reset();
     constexpr long long paths = 200'000;
-    const Table traced = measure_reference(surface, honest::material(), other, {paths}, {}).table;
+    const Table traced = measure_reference(surface, material, other, {paths}, {}).table;
 
     nlohmann::json document = {{"name", field.name},
+                               {"facets", argv[2]},
                                {"surface_hash", surface_hash(surface)},
-                               {"command", std::string("make_honest_references ") + field.name},
+                               {"command", std::string("make_honest_references ") + argv[1] + " " + argv[2]},
                                {"rms_relative_se", rms_relative(table.se, table.f)},
                                {"rms_relative_bias", rms_relative(table.bias, table.f)},
                                {"path_tracer", cross_check(table, traced, paths)},
                                {"f", table.f}};
     for (const auto& [key, value] : result.report.settings) document["settings"][key] = value;
-    std::ofstream(argv[2]) << document.dump(1) << "\n";
+    std::ofstream(argv[3]) << document.dump(1) << "\n";
 }

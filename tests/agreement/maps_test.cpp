@@ -84,6 +84,35 @@ TEST(Maps, HaveTheBrdfFromAboveAsTheirMean) {
         }
 }
 
+// Where facets are not Lambertian the maps are of what arrives. A glossy lobe of no weight changes nothing
+// but that, and who carries the light.
+TEST(Maps, OfGlossyFacetsAreIrradiances) {
+    const HeightField field = generate_gaussian(64, 64, 1, 8, 0.7, 11);
+    MapsPlan plan = maps_plan({{30, 40}, {60, 200}}, {{45, 10}});
+    plan.accuracy.samples = Accuracy::Samples{4, 256, 1, 4};
+    const Material lambertian = gray({0.8});
+    Material mixture = lambertian;
+    Microfacet ggx;
+    ggx.alpha_x = ggx.alpha_y = 0.3;
+    mixture.lobes.push_back({0.0, ggx});
+    const Maps sent = measure_maps(field, lambertian, plan, {}).maps;
+    const MapsResult result = measure_maps(field, mixture, plan, {});
+    const Maps& arrived = result.maps;
+    EXPECT_EQ(result.report.settings.front().second, "pair graph");
+    ASSERT_EQ(arrived.layers.size(), sent.layers.size());
+    for (size_t k = 0; k < sent.layers.size(); ++k) {
+        const MapLayer &a = arrived.layers[k], &b = sent.layers[k];
+        EXPECT_EQ(a.name, b.name);
+        const double albedo = a.name.find(".c0") == std::string::npos ? 1.0 : 0.8;
+        double squares = 0;
+        for (size_t p = 0; p < a.pixels.size(); ++p)
+            squares += std::pow(albedo * a.pixels[p] - b.pixels[p], 2);
+        const double rms = std::sqrt(squares / static_cast<double>(a.pixels.size()));
+        EXPECT_LE(rms, 1.5 * std::hypot(albedo * a.se, b.se) + 1e-6) << a.name;
+        EXPECT_NEAR(albedo * a.mean, b.mean, 0.01 * b.mean) << a.name;
+    }
+}
+
 TEST(Maps, StateTheErrorOfAPixel) {
     const HeightField field = generate_gaussian(64, 64, 1, 8, 0.7, 5);
     MapsPlan plan = maps_plan({{50, 30}}, {}, {1, 32, 1, 6});

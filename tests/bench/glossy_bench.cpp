@@ -1,9 +1,9 @@
 // Glossy and mixed facets: CPU time and error of the pair graph beside what the path tracer on Embree needs
 // for the same error. One thread, one run; N = 128, correlation length 8, 64 x 64 directions. The error is
 // the cosine-weighted rms over the table, over its mean, against a converged pair graph of other random
-// numbers; the path tracer's is its own rms distance from that over 8 of the views, carried to other path
-// counts as n^-1/2.
-//   glossy_bench [PATHS] [FIRST CASE]    PATHS 0: no path tracer
+// numbers; the path tracer's over 8 of the views, with more and more paths until it is below the target: its
+// time at the target lies between the last two.
+//   glossy_bench [FIRST CASE [LAST CASE]]    with a path tracer: 0 to 3
 #include <cstdio>
 #include <cstdlib>
 
@@ -68,29 +68,80 @@ struct Case {
     const char* name;
     double slope;
     Material material;
+    double target;
     Accuracy::Samples samples;  // 2 runs of them are measured
+    bool traced;                // by the path tracer, too
 };
 
-void run(const Case& c, long long paths) {
-    const HeightField surface = bench::field(128, c.slope);
-    const Table converged = graph(surface, c.material, {8, 1024, 1, 4}, 77).table;
-    graph(surface, c.material, {1, 32, 1, 2}, 5);  // warm
-    const Timed found = graph(surface, c.material, c.samples, 1);
-    const double own = error(found.table, converged);
-    std::printf("%-28s graph %.3f s at %.3f %%", c.name, found.seconds, 100 * own);
-    if (paths > 0) {
-        const auto all = bench::sixty_four_directions();
-        std::vector<AnglesDeg> views;
-        for (size_t k = 0; k < 8; ++k) views.push_back(all[8 * k + k]);
+// Seconds for a whole table at the target error, between the last two of more and more paths.
+double path_tracer(const HeightField& surface, const Case& c, const Table& converged) {
+    const auto all = bench::sixty_four_directions();
+    std::vector<AnglesDeg> views;
+    for (size_t k = 0; k < 8; ++k) views.push_back(all[8 * k + k]);
+    double seconds_before = 0, error_before = 0;
+    for (long long paths = 16384;; paths *= 2) {
         const double start = bench::cpu_seconds();
         const Table traced =
             measure_reference(surface, c.material, plan_of(views, c.samples, 3), {paths}, {}).table;
-        const double seconds = 8 * (bench::cpu_seconds() - start), off = error(traced, converged);
-        std::printf("; path tracer %.1f s a table at %.3f %%; %.0f times", seconds, 100 * off,
-                    seconds * std::pow(off / own, 2) / found.seconds);
+        const double seconds = 8 * (bench::cpu_seconds() - start), now = error(traced, converged);
+        std::printf("    path tracer, %lld paths a view: %.1f s a table at %.3f %%\n", paths, seconds,
+                    100 * now);
+        std::fflush(stdout);
+        if (now < c.target) {
+            if (error_before == 0) return seconds;
+            const double share = std::log(error_before / c.target) / std::log(error_before / now);
+            return seconds_before * std::pow(seconds / seconds_before, share);
+        }
+        seconds_before = seconds;
+        error_before = now;
     }
-    std::printf("\n");
+}
+
+double run(const Case& c) {
+    const HeightField surface = bench::field(128, c.slope);
+    const Table converged = graph(surface, c.material, {8, 1024, 1, 4}, 77).table;
+    graph(surface, c.material, {1, 32, 1, 2}, 5);  // warm
+    double seconds = 0, error_of = 0;
+    constexpr int repeats = 3;  // other random numbers each: mean time, rms error
+    for (int k = 0; k < repeats; ++k) {
+        const Timed found = graph(surface, c.material, c.samples, 1 + k);
+        seconds += found.seconds / repeats;
+        error_of += std::pow(error(found.table, converged), 2) / repeats;
+    }
+    std::printf("%-28s target %.1f %%: pair graph %.3f s at %.3f %%\n", c.name, 100 * c.target, seconds,
+                100 * std::sqrt(error_of));
+    if (c.traced) {
+        const double traced = path_tracer(surface, c, converged);
+        std::printf("    path tracer at %.1f %%: %.1f s, %.0f times\n", 100 * c.target, traced,
+                    traced / seconds);
+    }
     std::fflush(stdout);
+    return seconds;
+}
+
+// 16 x 16 lights by 16 x 16 views, all orders; error against 16 of the views converged.
+void sixteen_to_the_fourth() {
+    const HeightField surface = bench::field(128, 0.5);
+    std::vector<AnglesDeg> directions;
+    for (int t = 0; t < 16; ++t)
+        for (int a = 0; a < 16; ++a) directions.push_back({5.0 * t + 2.5, 22.5 * a + 1.7 * t});
+    for (const auto& [name, material] :
+         {std::pair{"GGX 0.3", Material({"y"}, ggx(0.3))}, {"Lambert", Material({"y"}, Lambertian{0.8})}}) {
+        BrdfPlan plan;
+        plan.incident = plan.outgoing = directions;
+        plan.accuracy.target_relative_error = 0.005;
+        const double start = bench::cpu_seconds();
+        const BrdfResult found = measure_brdf(surface, material, plan, {});
+        const double seconds = bench::cpu_seconds() - start;
+        plan.outgoing.clear();
+        for (size_t k = 0; k < 16; ++k) plan.outgoing.push_back(directions[17 * k]);
+        plan.accuracy = {};
+        plan.accuracy.samples = Accuracy::Samples{8, 512, 1, 4};
+        plan.accuracy.seed = 77;
+        const Table converged = measure_brdf(surface, material, plan, {}).table;
+        std::printf("16^4, %s, target 0.5 %%: %.2f s, error stated %.3f %%, rms over mean %.3f %%\n", name,
+                    seconds, 100 * found.report.relative_error, 100 * error(converged, found.table));
+    }
 }
 
 }  // namespace
@@ -98,12 +149,20 @@ void run(const Case& c, long long paths) {
 
 int main(int argc, char** argv) {
     using namespace gonio;
-    const long long paths = argc > 1 ? std::atoll(argv[1]) : 4096;
-    const std::vector<Case> cases = {{"GGX 0.3", 0.5, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}},
-                                     {"GGX 0.15", 0.5, {{"y"}, ggx(0.15)}, {1, 126, 1, 2}},
-                                     {"GGX 0.3, slope 0.7", 0.7, {{"y"}, ggx(0.3)}, {1, 54, 1, 2}},
-                                     {"half diffuse, half GGX 0.2", 0.5, half_diffuse(0.2), {1, 54, 1, 2}},
-                                     {"Lambert", 0.5, {{"y"}, Lambertian{0.8}}, {1, 54, 1, 2}}};
-    const size_t first = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 0;
-    for (size_t k = first; k < cases.size(); ++k) run(cases[k], paths);
+    const Accuracy::Samples equal{1, 42, 1, 2};
+    const std::vector<Case> cases = {
+        {"GGX 0.3", 0.5, {{"y"}, ggx(0.3)}, 0.003, {1, 42, 1, 2}, true},
+        {"GGX 0.15", 0.5, {{"y"}, ggx(0.15)}, 0.01, {1, 90, 1, 2}, true},
+        {"GGX 0.3, slope 0.7", 0.7, {{"y"}, ggx(0.3)}, 0.005, {1, 28, 1, 2}, true},
+        {"half diffuse, half GGX 0.2", 0.5, half_diffuse(0.2), 0.003, equal, true},
+        {"Lambert", 0.5, {{"y"}, Lambertian{0.8}}, 0.003, equal, false}};
+    const size_t first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 0,
+                 last = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : cases.size();
+    double mixture = 0;
+    for (size_t k = first; k <= std::min(last, cases.size() - 1); ++k) {
+        const double seconds = run(cases[k]);
+        if (k == 3) mixture = seconds;
+        if (k == 4 && mixture > 0) std::printf("    mixture over Lambert: %.2f\n", mixture / seconds);
+    }
+    if (last >= cases.size()) sixteen_to_the_fourth();
 }

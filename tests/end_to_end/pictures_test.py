@@ -8,7 +8,6 @@ import os
 import pathlib
 import shutil
 import signal
-import struct
 import subprocess
 import sys
 import tempfile
@@ -16,6 +15,7 @@ import time
 import unittest
 
 import numpy as np
+from read_exr import read_exr
 
 GONIO = os.path.abspath(sys.argv.pop(1))
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -115,7 +115,7 @@ class Pictures(unittest.TestCase):
             np.testing.assert_allclose(images[camera, 0, 0], expected, rtol=2e-3)
 
     def test_maps(self):
-        outputs = [{"format": name, "path": f"a.{name}"} for name in ("arrays", "exr", "png")]
+        outputs = [{"format": name, "path": f"a.{name}"} for name in ("arrays", "exr", "png", "npy", "json")]
         self.run_job(job({"kind": "maps", "incident": {"list_deg": [[20, 0], [70, 90]]}, "outgoing": {"list_deg": [[60, 10]]}}, output=outputs))
         head, arrays = read(self.folder / "a.arrays")
         layer = dict(zip(head["layers"], arrays["maps"]))
@@ -125,20 +125,37 @@ class Pictures(unittest.TestCase):
             self.assertGreaterEqual(layer[name].min(), 0)
             self.assertLessEqual(layer[name].max(), 1.03)
         self.assertGreater(layer["light000.shadow"].mean(), layer["light001.shadow"].mean() + 0.1)
-        exr = (self.folder / "a.exr").read_bytes()
-        self.assertEqual(struct.unpack("<I", exr[:4])[0], 20000630)
-        self.assertIn(head["job_hash"].encode(), exr)
+        np.testing.assert_array_equal(np.load(self.folder / "a.npy"), arrays["maps"])
+        said = json.loads((self.folder / "a.json").read_text())
+        self.assertEqual(said, {name: value for name, value in head.items() if name != "arrays"})
+        self.assertEqual(said, json.loads((self.folder / "a.npy").read_bytes().rsplit(b"\n", 2)[-2]))
+        np.testing.assert_allclose(said["mean"], arrays["maps"].mean(axis=(1, 2)), rtol=1e-5)
+        attributes, channels = read_exr(self.folder / "a.exr")
+        self.assertEqual(attributes["gonio.job_hash"].decode(), head["job_hash"])
+        self.assertEqual(len(channels), len(layer))
+        np.testing.assert_array_equal(channels["light001.total.Y"][::-1], layer["light001.total.y"])
+        np.testing.assert_array_equal(channels["view000.mask.Y"][::-1], layer["view000.mask"])
 
     def test_examples(self):
         for name in ("lava_btf", "light_field", "lava_maps"):
             self.gonio("run", SOURCE / f"clients/examples/{name}.json", "--dry-run")
 
-    def test_not_lambertian(self):
-        document = job(btf())
-        document["material"] = {"model": "phong", "exponent": 5, "albedo": 0.5}
-        result = self.run_job(document, code=3)
-        self.assertIn("/material", result.stderr)
+    def test_glossy_facets_have_images_and_no_factored_form(self):
+        ggx = {"model": "ggx", "alpha": 0.3, "reflectance": 0.9}
+        pictures = btf(incident={"theta_deg": [0, 40], "phi_deg": [0, 90]})
+        refused = self.run_job({**job(pictures, output=[{"format": "btf", "path": "a.btf"}]), "material": ggx}, code=3)
+        self.assertIn("images", refused.stderr)
         self.assertEqual(self.left(), [])
+        outputs = [{"format": name, "path": f"a.{name}"} for name in ("images", "png", "json")]
+        for kind in (pictures, {**{k: v for k, v in pictures.items() if k != "outgoing"}, "kind": "light_field",
+                                "cameras": {"count": [2, 1], "width": "20 um", "height": "40 um"}}):
+            self.run_job({**job(kind, output=outputs[:2 if "cameras" in kind else 3]), "material": ggx})
+            head, arrays = read(self.folder / "a.images")
+            self.assertEqual(head["transport"], "pair graph")
+            images = np.asarray(arrays["images"], np.float64)
+            self.assertEqual(images.shape[1:], (4, 1, 48, 48))
+            means = images.mean(axis=(3, 4)).transpose(2, 1, 0)
+            np.testing.assert_allclose(arrays["mean"], means, rtol=1e-3)
 
     def test_what_cannot_be_expanded(self):
         self.run_job(job(btf(), output=[{"format": "btf", "path": "a.btf"}, {"format": "images", "path": "a.images"}]))

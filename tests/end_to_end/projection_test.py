@@ -18,6 +18,7 @@ import numpy as np
 GONIO = os.path.abspath(sys.argv.pop(1))
 SOURCE = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.path.insert(0, str(SOURCE / "clients/python/src"))
+from read_exr import read_exr  # noqa: E402
 from gonio import harmonics, read_projection, read_table  # noqa: E402
 
 PLANE = {"generate": "plane", "samples": 2, "pitch": "1 mm"}
@@ -30,7 +31,7 @@ def job(project, surface=PLANE, **measure):
     document = {"surface": surface, "material": {"model": "lambertian", "albedo": [0.8, 0.5, 0.2]},
                 "measure": {"kind": "brdf", "project": project, **measure},
                 "accuracy": {"samples": {"replicates": 4}},
-                "output": [{"format": name, "path": "p." + name} for name in ("json", "csv", "npy")]}
+                "output": [{"format": name, "path": "p." + name} for name in ("json", "csv", "npy", "exr")]}
     if "incident" not in measure and project.get("form", "per_light") == "per_light":
         document["measure"]["incident"] = LIGHTS
     return document
@@ -86,6 +87,14 @@ class Projection(unittest.TestCase):
         self.assertEqual(lines[head], "theta_i_deg,phi_i_deg,l,m,order,c_r,se_r,bias_r,c_g,se_g,bias_g,c_b,se_b,bias_b")
         rows = np.loadtxt(lines[head + 1:], delimiter=",")
         np.testing.assert_array_equal(rows[:, 5::3].reshape(2, 9, 3, 3).transpose(3, 2, 0, 1), projection.coefficients)
+        attributes, layers = read_exr(self.folder / "p.exr")
+        for slice_, layer in enumerate(("", "order1.", "order2.")):
+            for field, values in (("", projection.coefficients), ("se.", projection.standard_error), ("bias.", projection.bias)):
+                for channel, name in enumerate("RGB"):
+                    np.testing.assert_array_equal(layers[layer + field + name], values[channel, slice_].astype(np.float32))
+        self.assertEqual(len(layers), 27)
+        self.assertEqual(attributes["gonio.job_hash"].decode(), projection.provenance["job_hash"])
+        self.assertIn("cos(theta_i)", attributes["gonio.quantity"].decode())
         trailer = (self.folder / "p.npy").read_bytes().rsplit(b"\n", 2)[-2]
         self.assertIn(projection.provenance["job_hash"].encode(), trailer)
         self.assertEqual(json.loads(trailer[trailer.index(b'{"format"'):])["shape"], [3, 3, 2, 9])

@@ -44,7 +44,7 @@ class Relight(unittest.TestCase):
         return list(csv.DictReader(lines))
 
     def test_the_furnace_in_all_formats(self):
-        formats = ("csv", "json", "exr", "png", "arrays")
+        formats = ("csv", "json", "exr", "png", "arrays", "npy")
         self.run_job({"output": [{"format": name, "path": f"a.{name}"} for name in formats]})
         rows = self.read_csv("a.csv")
         self.assertEqual([row["theta_o_deg"] for row in rows], ["0", "60"])
@@ -57,6 +57,7 @@ class Relight(unittest.TestCase):
         arrays = {a["name"]: np.memmap(self.folder / "a.arrays", a["dtype"], "r", a["offset"], tuple(a["shape"])) for a in head["arrays"]}
         self.assertEqual(arrays["images"].shape, (2, 1, 40, 40))
         self.assertEqual(arrays["facet_radiance"].shape, (1, 2 * 40 * 40))
+        np.testing.assert_array_equal(np.load(self.folder / "a.npy"), arrays["images"])
         np.testing.assert_allclose(arrays["images"].mean(), 2, rtol=0.02)
         self.assertLess(np.abs(arrays["facet_radiance"] / 2 - 1).mean(), 0.05)
         for name in formats:

@@ -35,13 +35,24 @@ class Remote(Service):
 
     def test_run_writes_the_same_pictures(self):
         lights = {"list_deg": [[30, 0], [60, 90]]}
-        for measure, formats in (({"kind": "btf", "incident": lights, "outgoing": lights}, ("btf", "images", "png", "csv")),
-                                 ({"kind": "maps", "incident": lights}, ("arrays", "png"))):
-            self.write({**JOB, "measure": measure}, [{"format": name, "path": f"a.{name}"} for name in formats])
+        btf, matte, glossy = {"kind": "btf", "incident": lights, "outgoing": lights}, JOB["material"], {"model": "ggx", "alpha": 0.4, "metal": "Al"}
+        for material, measure, formats in ((matte, btf, ("btf", "images", "png", "csv")), (glossy, btf, ("images", "png", "csv")),
+                                           (glossy, {**btf, "kind": "light_field"}, ("images", "png")),
+                                           (matte, {"kind": "maps", "incident": lights}, ("arrays", "png")),
+                                           (glossy, {"kind": "maps", "incident": lights}, ("arrays", "npy"))):
+            self.write({**JOB, "material": material, "measure": measure, "accuracy": {"samples": {"directions": 16, "replicates": 2}}}, [{"format": name, "path": f"a.{name}"} for name in formats])
             self.gonio("run", "job.json", "-o", "local", "-q")
             self.gonio("run", "job.json", "-o", "remote", "-q", "--server", self.url)
             for name in formats:
                 self.assertEqual((self.folder / f"local/a.{name}").read_bytes(), (self.folder / f"remote/a.{name}").read_bytes())
+
+    def test_run_takes_the_environment_along(self):
+        (self.folder / "sky.hdr").write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + bytes(range(96, 128)) * 4)
+        self.write({**JOB, "environment": {"file": "sky.hdr"}, "measure": {"kind": "relight", "outgoing": {"list_deg": [[30, 0]]}}},
+                   [{"format": "csv", "path": "a.csv"}])
+        self.gonio("run", "job.json", "-o", "local", "-q")
+        self.gonio("run", "job.json", "-o", "remote", "-q", "--server", self.url)
+        self.assertEqual((self.folder / "local/a.csv").read_bytes(), (self.folder / "remote/a.csv").read_bytes())
 
     def test_submit_wait_fetch_list(self):
         self.write(MEDIUM, [{"format": "csv", "path": "a.csv"}])

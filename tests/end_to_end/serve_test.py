@@ -180,8 +180,10 @@ class Ends(Service):
         self.assertEqual(list((self.folder / "shared").iterdir()), [])
 
     def test_sigterm_drains(self):
-        job = self.submit(MEDIUM)["jobID"]
-        time.sleep(0.7)
+        longer = {**MEDIUM, "accuracy": {"target_relative_error": 0.001}}
+        job = self.submit(longer)["jobID"]
+        while self.call("GET", f"/jobs/{job}")[1]["status"] != "running":
+            time.sleep(0.01)
         begin = time.monotonic()
         self.daemon.process.send_signal(signal.SIGTERM)
         self.assertEqual(self.daemon.process.wait(20), 0)
@@ -191,7 +193,7 @@ class Ends(Service):
             self.assertEqual(database.execute("SELECT status, attempts FROM jobs").fetchall(), [("accepted", 0)], "back in the queue")
         self.start()
         self.assertEqual(self.wait(job)["status"], "successful")
-        self.assertEqual(self.table(job), self.local(MEDIUM))
+        self.assertEqual(self.table(job), self.local(longer))
 
     def test_tokens(self):
         tokens = self.folder / "tokens"

@@ -62,8 +62,8 @@ class Service(unittest.TestCase):
         status, self.headers, answer = self.daemon.ask(method, path, body, **headers)
         return status, answer
 
-    def submit(self, inputs, **headers):
-        status, info = self.call("POST", "/processes/brdf/execution", {"inputs": inputs}, **headers)
+    def submit(self, inputs, process="brdf", **headers):
+        status, info = self.call("POST", f"/processes/{process}/execution", {"inputs": inputs}, **headers)
         self.assertEqual(status, 201, info)
         return info
 

@@ -12,25 +12,12 @@ import subprocess
 import time
 import unittest
 
+from exr_file import exr
 from service_fixture import GONIO, GROOVE, JOB, LONG, MEASURE, Service
 
 PROGRAM = pathlib.Path(GONIO).read_bytes()
 not_sanitized = unittest.skipIf(b"__tsan_init" in PROGRAM or b"__asan_init" in PROGRAM, "a sanitizer needs what the decoding process may not do")
 ALICE, BOB = "alice-0123456789abcdef", "bob-0123456789abcdef"
-
-
-def exr(width, height, values):
-    """A scan-line OpenEXR file of one float channel, without compression."""
-    def attribute(name, kind, payload):
-        return name.encode() + b"\0" + kind.encode() + b"\0" + struct.pack("<i", len(payload)) + payload
-    box = struct.pack("<4i", 0, 0, width - 1, height - 1)
-    head = struct.pack("<ii", 20000630, 2) + attribute("channels", "chlist", b"Y\0" + struct.pack("<iiii", 2, 0, 1, 1) + b"\0")
-    head += attribute("compression", "compression", b"\0") + attribute("dataWindow", "box2i", box) + attribute("displayWindow", "box2i", box)
-    head += attribute("lineOrder", "lineOrder", b"\0") + attribute("pixelAspectRatio", "float", struct.pack("<f", 1))
-    head += attribute("screenWindowCenter", "v2f", struct.pack("<2f", 0, 0)) + attribute("screenWindowWidth", "float", struct.pack("<f", 1)) + b"\0"
-    lines = [struct.pack("<ii", y, 4 * width) + struct.pack(f"<{width}f", *values[y * width:(y + 1) * width]) for y in range(height)]
-    first = len(head) + 8 * height
-    return head + b"".join(struct.pack("<Q", first + k * len(lines[0])) for k in range(height)) + b"".join(lines)
 
 
 class Limits(Service):
@@ -191,6 +178,30 @@ class Limits(Service):
                                   {"inputs": {"surface": {"sha256": self.put(bytes(damaged)), **surface}}})
             self.assertIn(status, (201, 400, 422))
         self.assertEqual(self.call("GET", "/healthz")[0], 200)
+
+    def test_every_member_of_a_job_document_is_an_input(self):
+        measure = {"kind": "brdf", "incident": {"list_deg": [[30, 0]]}, "outgoing": {"list_deg": [[20, 90]]}, "max_order": 2}
+        curved = {**JOB, "measure": measure, "base": {"kappa_1": 5, "kappa_2": 2, "direction_deg": 30}}
+        info = self.submit(curved, Prefer="wait=30")
+        self.assertEqual(info["status"], "successful", info)
+        self.assertEqual(self.table(info["jobID"]), self.local(curved))
+        members = set(json.loads(subprocess.run([GONIO, "schema"], check=True, capture_output=True, text=True).stdout)["properties"])
+        kinds = ("brdf", "btf", "light_field", "maps", "relight")
+        inputs = set().union(*(self.call("GET", f"/processes/{kind}")[1]["inputs"] for kind in kinds))
+        self.assertEqual(inputs, members - {"$schema", "output"})
+
+    @not_sanitized
+    def test_environment_of_a_stranger(self):
+        sky = exr(16, 8, [0.25 * (k % 16) for k in range(128)])
+        (self.folder / "sky.exr").write_bytes(sky)
+        inputs = {**JOB, "environment": {"sha256": self.put(sky), "rotation_deg": 20},
+                  "measure": {"kind": "relight", "outgoing": {"list_deg": [[30, 0]]}}}
+        info = self.submit(inputs, "relight", Prefer="wait=30")
+        self.assertEqual(info["status"], "successful", info)
+        local = {**inputs, "environment": {"file": "sky.exr", "rotation_deg": 20}}
+        self.assertEqual(self.call("GET", f"/jobs/{info['jobID']}/results/relight?f=csv")[1], self.local(local))
+        detail = self.refused({**inputs, "environment": {"sha256": self.put(sky[:-40])}}, 400, "/inputs", "relight")
+        self.assertIn("damaged", detail)
 
     def test_metrics(self):
         self.restart("--admin-listen", "127.0.0.1:0")

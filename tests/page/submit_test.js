@@ -103,6 +103,99 @@ describe("submitting", () => {
         await page.getByText("is not a number").first().waitFor();
     }, { allowed: [/status of 40[04]/] }));
 
+    const few = async (page, ...names) => {
+        for (const name of names) await page.locator(`[data-pointer='/inputs/measure/${name}/theta_deg'] input`).fill("0, 40");
+        if (names.includes("outgoing")) await page.locator("[data-pointer='/inputs/measure/outgoing/phi_deg'] input").fill("0");
+    };
+    const small = async (page) => {
+        await page.goto(`${service.url}/page/`);
+        await page.getByLabel("Points along x").fill("24");
+        await page.getByLabel("Target relative error").fill("0.1");
+    };
+    // These tests leave a page for the next measurement while it still asks for its jobs.
+    const leaving = { allowed: [/Failed to fetch/] };
+    const sentTo = (page, process) => page.waitForRequest((request) => request.url().endsWith(`/processes/${process}/execution`))
+        .then((request) => request.postDataJSON().inputs);
+    const angles = { theta_deg: [0, 40], phi_deg: [0] };
+
+    it("measures every kind, and shows it", () => withPage(`${service.url}/page/`, async (page) => {
+        const kinds = [
+            ["projection", "brdf", ["incident"], { incident: angles, max_order: "all", project: { basis: "hsh", order: 4 } }],
+            ["btf", "btf", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all", pixels: [12, 12] }],
+            ["light_field", "light_field", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all" }],
+            ["maps", "maps", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all", sky_directions: 32 }],
+            ["relight", "relight", ["outgoing"], { outgoing: angles, max_order: "all", azimuths: 16 }]];
+        for (const [choice, process, directions, measured] of kinds) {
+            await small(page);
+            await page.getByLabel("What", { exact: true }).selectOption(choice);
+            await few(page, ...directions);
+            if (choice === "projection") await page.getByLabel("Order", { exact: true }).fill("4");
+            if (choice === "btf") await page.getByLabel("Pixels, columns and rows").fill("12 12");
+            if (choice === "maps") await page.getByLabel("Directions of the sky").fill("32");
+            if (choice === "relight") await screenshot(page, "new_relight");
+            const sent = sentTo(page, process);
+            await measure(page).click();
+            const inputs = await sent;
+            assert.deepEqual(inputs.measure, { kind: process, ...measured });
+            assert.deepEqual(inputs.environment, choice === "relight" ? { radiance: 1 } : undefined);
+            if (choice === "projection") await page.getByRole("region", { name: "Sphere", exact: true }).waitFor();
+            else await page.getByRole("img", { name: `Picture of ${process.replaceAll("_", " ")}` }).waitFor();
+        }
+    }, leaving));
+
+    it("takes every material, curved bases and receiver cells as far as the server does", () => withPage(`${service.url}/page/`, async (page) => {
+        const expected = {
+            colour: { model: "lambertian", albedo: [0.8, 0.5, 0.3] },
+            phong: { model: "phong", exponent: 20, albedo: 0.8 },
+            blinn_phong: { model: "blinn_phong", exponent: 20, albedo: 0.8 },
+            ggx_metal: { model: "ggx", alpha: 0.3, metal: "Al" },
+            ggx: { model: "ggx", alpha: 0.3, reflectance: 1 },
+            beckmann_metal: { model: "beckmann", alpha: 0.3, metal: "Al" },
+            brushed: { model: "ggx", alpha_x: 0.1, alpha_y: 0.4, rotation_deg: 0, metal: "Al" },
+            coated_diffuse: { model: "coated_diffuse", eta: 1.5, alpha: 0.1, albedo: 0.8 },
+            mixture: { model: "mixture", parts: [{ weight: 0.5, model: "lambertian", albedo: 0.8 }, { weight: 0.5, model: "ggx", alpha: 0.3, reflectance: 1 }] },
+        };
+        for (const [name, material] of Object.entries(expected)) {
+            await small(page);
+            await few(page, "incident", "outgoing");
+            await page.getByLabel("Facets").selectOption(name);
+            const sent = sentTo(page, "brdf");
+            await measure(page).click();
+            assert.deepEqual((await sent).material, material);
+            await page.waitForURL(/#job=/);
+        }
+        await small(page);
+        await few(page, "incident");
+        await page.getByLabel("Facets").selectOption("mirror");
+        await page.getByLabel("Seen from").selectOption("equal_cells");
+        let sent = sentTo(page, "brdf");
+        await measure(page).click();
+        assert.deepEqual((await sent).measure.outgoing, { cells: { equal: 64 } });
+        await page.waitForURL(/#job=/);
+        await small(page);
+        await few(page, "incident", "outgoing");
+        await page.getByLabel("It stands on").selectOption("curved");
+        sent = sentTo(page, "brdf");
+        await measure(page).click();
+        assert.deepEqual((await sent).base, { kappa_1: 10, kappa_2: 0, direction_deg: 0 });
+        await page.waitForURL(/#job=/);
+    }, leaving));
+
+    it("lights with an uploaded environment", () => withPage(`${service.url}/page/`, async (page) => {
+        const sky = Buffer.concat([Buffer.from("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n"), Buffer.from(Array.from({ length: 128 }, (_, k) => 96 + k % 32))]);
+        await small(page);
+        await page.getByLabel("What", { exact: true }).selectOption("relight");
+        await few(page, "outgoing");
+        await page.getByText("Map", { exact: true }).click();
+        await page.setInputFiles("#environment-map", { name: "sky.hdr", mimeType: "application/octet-stream", buffer: sky });
+        await page.getByText(`sky.hdr, ${sky.length} B`).waitFor();
+        await page.getByLabel("Brightness times").fill("2");
+        const sent = sentTo(page, "relight");
+        await measure(page).click();
+        assert.deepEqual((await sent).environment, { sha256: sha256(sky), rotation_deg: 0, scale: 2 });
+        await page.getByAltText("Picture of relight").waitFor();
+    }, { allowed: [...leaving.allowed, /status of 404/] }));
+
     it("hashes like everybody else", () => withPage(`${service.url}/page/`, async (page) => {
         for (const size of [0, 1, 55, 56, 63, 64, 65, 119, 120, 1000, 70001]) {
             const own = await page.evaluate(async (n) => {

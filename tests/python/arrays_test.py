@@ -33,6 +33,14 @@ class Files(ServiceTest):
                                             "cameras": {"count": [3, 2], "width": "1 mm", "height": "5 mm"}}).wait(120)
         self.assertEqual(gonio.read_arrays(field.fetch(self.folder / "f.btf", "light_field")).images(5).shape, (2, 1, 1, 16))
 
+    def test_an_environment_is_uploaded(self):
+        sky = self.folder / "sky.hdr"
+        sky.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 4 +X 8\n" + bytes(range(96, 128)) * 4)
+        job = gonio.Client(self.service.url).submit(BTF, environment={"file": sky}, measure={"kind": "relight", "outgoing": LIGHTS}).wait(120)
+        local = gonio.run_files(self.folder, BTF, environment={"file": sky}, measure={"kind": "relight", "outgoing": LIGHTS},
+                                program=GONIO, output=[{"format": "npy", "path": "a.npy"}])
+        np.testing.assert_array_equal(np.load(job.fetch(self.folder / "b.npy", "relight", "npy")), np.load(local[0]))
+
     def test_a_process_takes_its_own_kind(self):
         with self.assertRaises(gonio.ApiError) as caught:
             gonio.Client(self.service.url).submit(BTF, process="brdf")

@@ -276,5 +276,72 @@ TEST(KeyLights, TakeTheSunAndLeaveTheSky) {
     EXPECT_EQ(split_key_lights(smooth_sky(64, 30000)).key_lights.size(), 0u) << "texels of 6 degrees";
 }
 
+// Anywhere in the texel, uniform in solid angle.
+TEST(KeyLights, FillTheirTexels) {
+    Environment e = uniform_environment({1});
+    e.nx = 180, e.ny = 90, e.rotation = 0.3;
+    const KeyLight light{20, 50, {1}};
+    const auto phi = [&](double u) {
+        const Vec3 d = direction_of(e, light, u, 0.5);
+        return std::atan2(d.y, d.x);
+    };
+    EXPECT_NEAR(phi(0), 0.3 + pi * (1 - 2 * 50.0 / 180), 1e-12);
+    EXPECT_NEAR(phi(0) - phi(1), 2 * pi / 180, 1e-12);
+    for (const double v : {0.0, 0.25, 1.0})
+        EXPECT_NEAR(direction_of(e, light, 0.5, v).z,
+                    (1 - v) * std::cos(pi * 20 / 90) + v * std::cos(pi * 21 / 90), 1e-12);
+}
+
+Environment black(int nx, int ny, int n_channels) {
+    Environment e;
+    e.nx = nx, e.ny = ny, e.n_channels = n_channels;
+    e.radiance.assign(static_cast<size_t>(n_channels) * nx * ny, 0.0f);
+    return e;
+}
+
+// A sun in one channel is one for all; of a hundred lamps the 64 brightest are taken.
+TEST(KeyLights, OfAnyColourAndManyLamps) {
+    for (int channel = 0; channel < 3; ++channel) {
+        Environment e = black(180, 90, 3);
+        std::fill(e.radiance.begin(), e.radiance.end(), 0.01f);
+        e.radiance[(static_cast<size_t>(channel) * e.ny + 30) * e.nx + 7] = 1000;
+        const SplitEnvironment split = split_key_lights(e);
+        ASSERT_EQ(split.key_lights.size(), 1u) << channel;
+        EXPECT_EQ(split.key_lights[0].row, 30);
+        EXPECT_EQ(split.key_lights[0].column, 7);
+        for (int c = 0; c < 3; ++c) EXPECT_EQ(split.sky.texel(c, 30, 7), 0);
+    }
+    Environment lamps = black(180, 90, 1);
+    for (int k = 0; k < 100; ++k) lamps.radiance[30 * 180 + k] = 1 + 0.01f * static_cast<float>(k);
+    const SplitEnvironment split = split_key_lights(lamps);
+    ASSERT_EQ(split.key_lights.size(), 64u);
+    for (int k = 0; k < 100; ++k) EXPECT_EQ(split.sky.texel(0, 30, k) == 0, k >= 36) << k;
+}
+
+// Rows that the horizon cuts in two, and waves that as many azimuths cannot tell from even light.
+TEST(SkyIrradiance, OfCutRowsAndFineWaves) {
+    const HeightField plane = generate_plane(4, 1);
+    const MarchGrid grid = make_march_grid(plane);
+    const Tile tile = whole(plane);
+    const auto expect_exact = [&](const Environment& sky, int azimuths) {
+        const Fields e = sky_irradiance(grid, tile, sky, {0.3, 0.6},
+                                        {.azimuths = azimuths, .shift = 0.3, .horizon = {}}, 1, no_monitor);
+        const double expected = horizontal_irradiance(sky, 0);
+        ASSERT_GT(expected, 0);
+        EXPECT_NEAR(e.block(0)[0] / tile.sqrt_area[0], expected, 1e-3 * expected) << azimuths;
+    };
+    Environment cut = black(90, 45, 1);
+    for (int i = 0; i < cut.nx; ++i) cut.radiance[22 * 90 + i] = 1;
+    expect_exact(cut, 8);
+    for (const int azimuths : {8, 9}) {
+        Environment waves = black(180, 90, 1);
+        for (int j = 0; j < 45; ++j)
+            for (int i = 0; i < 180; ++i)
+                waves.radiance[j * 180 + i] =
+                    static_cast<float>(1 + std::cos(2 * pi * (azimuths / 2 + azimuths % 2) * i / 180));
+        expect_exact(waves, azimuths);
+    }
+}
+
 }  // namespace
 }  // namespace gonio

@@ -102,12 +102,12 @@ TEST_P(ViewMapOf, IsWhatARayTriedOnEveryTriangleMeets) {
 TEST_P(ViewMapOf, IsSoForTheRaysOfACamera) {
     const Case& c = GetParam();
     const HeightField surface = bumpy(c.nx, c.ny, c.pitch_y);
-    const MarchGrid grid = make_march_grid(surface);
+    const TraceGrid grid = make_trace_grid(surface);
     const PixelGrid pixels{{0, 0, c.nx, c.ny}, c.pixels_x, c.pixels_y, c.plane_height};
     int compared = 0;
     for (const Vec3& place :
          {Vec3{0.4 * c.nx, 0.6 * c.ny, 20.0}, Vec3{-15, 3, 12}, Vec3{c.nx + 9.0, c.ny + 14.0, 20}}) {
-        const ViewMap map = make_camera_map(grid, place, pixels, 0.37, 0.61, c.refinement);
+        const ViewMap map = make_camera_map(grid, surface, place, pixels, 0.37, 0.61, c.refinement);
         EXPECT_EQ(map.unresolved, 0);
         for (int j = 0; j < c.pixels_y; ++j)
             for (int i = 0; i < c.pixels_x; ++i) {
