@@ -86,7 +86,13 @@ RunValues DiffuseTransport::run(const RunSettings& settings, int stage, int run,
 }
 
 std::string DiffuseTransport::settings_key(const RunSettings& settings) const {
-    return gonio::settings_key(context_, settings);
+    return gonio::settings_key(
+        TransportKind::diffuse, settings,
+        {static_cast<double>(context_.indirect), static_cast<double>(context_.allow_skips),
+         static_cast<double>(context_.keep_orders), static_cast<double>(!context_.view_to_light.empty()),
+         static_cast<double>(context_.fixed_applications), static_cast<double>(context_.single_orders),
+         static_cast<double>(context_.keep_first), static_cast<double>(context_.max_bytes),
+         context_.series_tolerance});
 }
 
 void DiffuseTransport::fix_orders(const RunValues& first) {

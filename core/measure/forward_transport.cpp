@@ -4,12 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <numeric>
 
 #include "base/parallel.h"
 #include "base/random.h"
-#include "base/sha256.h"
 #include "measure/describe.h"
 #include "visibility/march.h"
 
@@ -135,10 +133,9 @@ RunValues ForwardTransport::run(const RunSettings& settings, int stage, int run,
 }
 
 std::string ForwardTransport::settings_key(const RunSettings& settings) const {
-    const double numbers[] = {static_cast<double>(settings.sub_samples),
-                              static_cast<double>(settings.block_step),
-                              static_cast<double>(scene_.allow_skips), static_cast<double>(single_orders_)};
-    return sha256_hex(bytes_of(numbers, std::size(numbers))).substr(0, 16);
+    return gonio::settings_key(
+        TransportKind::forward, settings,
+        {static_cast<double>(scene_.allow_skips), static_cast<double>(single_orders_)});
 }
 
 void ForwardTransport::fix_orders(const RunValues& first) {

@@ -230,7 +230,7 @@ class GlossyBtf::Measurement {
         pixels_.describe(report_);
         report_.counters.push_back({"view_rays_unresolved", unresolved_});
         report_.seconds = {{"wall", seconds()}};
-        if (pixels_.heaviest() > 1)
+        if (pixels_.lobe_share_of_pair() > most_honest_share)
             report_.warnings.push_back(
                 "the lobes are narrower than the shared directions are dense: orders 3 and up of single "
                 "pixels are rough (see pixel_se); ask for more directions");

@@ -37,7 +37,12 @@ double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples)
 GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material, const BtfPlan& plan,
                            const Accuracy::Samples& samples, const RunOptions& options,
                            const Monitor& monitor)
-    : surface_(surface), plan_(plan), samples_(samples), options_(options), monitor_(monitor) {
+    : surface_(surface),
+      plan_(plan),
+      samples_(samples),
+      options_(options),
+      monitor_(monitor),
+      material_(simplified(material)) {
     require_supported(surface, material);
     grid_ = make_march_grid(surface);
     const CellRect all{0, 0, surface.nx, surface.ny};
@@ -45,7 +50,7 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
     context_.grid = &grid_;
     context_.indirect = grid_.max_slope > 0;
     for (size_t c = 0; c < material.channels.size(); ++c)
-        materials_.push_back(slot_material(simplified(material), surface, tile_, c));
+        materials_.push_back(slot_material(material_, surface, tile_, c));
     for (const AnglesDeg& light : plan.incident) lights_.push_back(to_vector(light));
     for (size_t first = 0; first < lights_.size(); first += light_block)
         light_blocks_.push_back(DirectionArrays(
@@ -54,6 +59,12 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
     if (plan.cameras) cameras_ = camera_places(surface, plan);
     plane_height_ = view_plane_height(surface, plan);
     run_bytes_ = glossy_run_bytes(btf_shape(surface, material, plan, samples.refinement), samples);
+}
+
+double GlossyPixels::lobe_share_of_pair() const {
+    return context_.indirect && plan_.max_order != 1
+               ? gonio::lobe_share_of_pair(material_, grid_.max_slope, tile_, samples_.directions)
+               : 0.0;
 }
 
 bool GlossyPixels::fits_another() const {
@@ -97,7 +108,6 @@ void GlossyPixels::add_run() {
                                                 options_.n_threads, monitor_, found));
                 orders_ = std::max(orders_, found.n_orders);
                 remainder_ = std::max(remainder_, found.remainder);
-                heaviest_ = std::max(heaviest_, found.heaviest);
             }
         }
     }

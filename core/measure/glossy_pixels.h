@@ -35,7 +35,7 @@ class GlossyPixels {
     void forget_runs() { runs_.clear(); }
 
     double remainder() const { return remainder_; }  // as in GraphOrders: the largest
-    double heaviest() const { return heaviest_; }
+    double lobe_share_of_pair() const;               // as in graph_run.h; 0 if no pairs are needed
     void describe(Report& report) const;
 
   private:
@@ -56,6 +56,7 @@ class GlossyPixels {
     MarchGrid grid_;
     Tile tile_;
     GraphContext context_;
+    Material material_;
     std::vector<SlotMaterial> materials_;  // one a channel
     std::vector<Vec3> lights_;
     std::vector<DirectionArrays> light_blocks_;
@@ -64,7 +65,7 @@ class GlossyPixels {
     double run_bytes_ = 0;
     int started_runs_ = 0;
     std::vector<Run> runs_;
-    double rays_ = 0, pairs_ = 0, truncated_ = 0, remainder_ = 0, heaviest_ = 0;
+    double rays_ = 0, pairs_ = 0, truncated_ = 0, remainder_ = 0;
     int orders_ = 0;
 };
 

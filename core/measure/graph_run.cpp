@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "material/lobe_shape.h"
 #include "measure/blocks.h"
 #include "measure/windows.h"
 #include "scattering/glossy_direct.h"
@@ -234,6 +235,12 @@ double graph_run_bytes(const GraphContext& context, const RunSettings& settings,
                  pairs = unknowns * settings.directions / 9.0 * 0.35;
     return sides + 20 * pairs + scatter_bytes(pairs, std::min(n_lights, light_block), n_views) +
            16.0 * 2 * n_lights * n_views * static_cast<double>(context.channel_groups.size());
+}
+
+double lobe_share_of_pair(const Material& material, double max_slope, const Tile& tile, int n_directions) {
+    const double z_max = max_slope / std::sqrt(1 + max_slope * max_slope);
+    return highest_peak(material) * 4 * pi * z_max / n_directions * facet_subset(tile, n_directions) *
+           tile.n_parts();
 }
 
 PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "base/random.h"
 #include "base/sha256.h"
@@ -162,22 +161,15 @@ double run_bytes(const RunContext& context, const RunSettings& settings, int n_l
     return turned + copies * unknowns * 4 * (padded(n_lights) + padded(n_views)) + sums + links;
 }
 
-std::string settings_key(const RunContext& context, const RunSettings& settings) {
-    const double numbers[] = {static_cast<double>(settings.sub_samples),
-                              static_cast<double>(settings.directions),
-                              static_cast<double>(settings.refinement),
-                              static_cast<double>(settings.tiles_x),
-                              static_cast<double>(settings.tiles_y),
-                              static_cast<double>(context.indirect),
-                              static_cast<double>(context.allow_skips),
-                              static_cast<double>(context.keep_orders),
-                              static_cast<double>(!context.view_to_light.empty()),
-                              static_cast<double>(context.fixed_applications),
-                              static_cast<double>(context.single_orders),
-                              static_cast<double>(context.keep_first),
-                              static_cast<double>(context.max_bytes),
-                              context.series_tolerance};
-    return sha256_hex(bytes_of(numbers, std::size(numbers))).substr(0, 16);
+std::string settings_key(TransportKind transport, const RunSettings& settings,
+                         std::initializer_list<double> beside) {
+    std::vector<double> numbers{
+        static_cast<double>(transport),           static_cast<double>(settings.sub_samples),
+        static_cast<double>(settings.directions), static_cast<double>(settings.refinement),
+        static_cast<double>(settings.tiles_x),    static_cast<double>(settings.tiles_y),
+        static_cast<double>(settings.block_step)};
+    numbers.insert(numbers.end(), beside);
+    return sha256_hex(bytes_of(numbers.data(), numbers.size())).substr(0, 16);
 }
 
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,

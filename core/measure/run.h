@@ -1,6 +1,7 @@
 // One randomised run of the fast engine: a complete, unbiased table from one random shift of everything that
 // is shared. Independent runs give the mean and its standard error (Cranley-Patterson; design 3.3).
 #pragma once
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -64,9 +65,11 @@ struct RunValues {
 RunValues run_once(const RunContext& context, const RunSettings& settings, int stage, int run, int n_threads,
                    const Monitor& monitor);
 
-// What decides the bits of a run beside the job, the stage and the number of the run, and of that what a job
-// with another target may have in common with this one; 16 hex digits.
-std::string settings_key(const RunContext& context, const RunSettings& settings);
+// Names what decides the bits of a run beside the job, the stage and the number of the run: the transport,
+// its settings, and `beside` them what else it decided. Equal for jobs that may have the run in common; 16
+// hex digits.
+std::string settings_key(TransportKind transport, const RunSettings& settings,
+                         std::initializer_list<double> beside);
 
 // The random shifts of one run, in [0, 1): 0, 1 window position; 2, 3 sub-samples; 4, 5 direction lattice; 6,
 // 7 jitter; then what a transport needs beside.

@@ -9,8 +9,10 @@
 #include "material/coat.h"
 #include "material/facet_brdf.h"
 #include "material/fresnel.h"
+#include "material/lobe_shape.h"
 #include "material/metals.h"
 #include "material/microfacet_distribution.h"
+#include "surface/generate.h"
 #include "surface/height_field.h"
 
 namespace gonio {
@@ -160,6 +162,36 @@ TEST(Metals, HaveTheirColours) {
 }
 
 // ---- value
+
+// What the facet itself sends straight back.
+TEST(LobeShape, PeaksAreThoseOfTheFacet) {
+    const HeightField plane = generate_plane(2, 2);
+    const Vec3 up{0, 0, 1};
+    const SpecularReflectance gold{{}, {0.2, 0.5, 1.3}, {3.0, 2.5, 1.9}}, half{0.5, {}, {}};
+    Material mixture({"y"}, Lambertian{0.6});
+    mixture.lobes.front().weight = 0.3;
+    mixture.lobes.push_back({0.5, rough(Distribution::beckmann, 0.1, 0.4, 20, half)});
+    for (const Material& material :
+         {Material({"y"}, Lambertian{0.7}), Material({"y"}, Phong{30.0, 0.5}),
+          Material({"y"}, BlinnPhong{0.0, 0.5}), Material({"y"}, BlinnPhong{80.0, 0.5}),
+          Material({"y"}, rough(Distribution::ggx, 0.2, 0.2)),
+          Material({"y"}, rough(Distribution::ggx, 1e-4, 1e-4)), mixture})
+        EXPECT_NEAR(highest_peak(material) / f_of(FacetBrdf(material, plane, 0, 0, 0), material, up, up)[0],
+                    1, 1e-6);
+    // Means over channels of the index, and a base under its coat: within the tenth that this is for.
+    const Material metal({"r", "g", "b"}, rough(Distribution::ggx, 0.3, 0.3, 0, gold)),
+        coat({"y"}, CoatedDiffuse{1.5, 0.1, 0.8});
+    double mean = 0;
+    for (const double f : f_of(FacetBrdf(metal, plane, 0, 0, 0), metal, up, up)) mean += f / 3;
+    EXPECT_NEAR(highest_peak(metal) / mean, 1, 0.1);
+    EXPECT_NEAR(highest_peak(coat) / f_of(FacetBrdf(coat, plane, 0, 0, 0), coat, up, up)[0], 1, 0.3);
+    EXPECT_TRUE(std::isinf(highest_peak({{"y"}, Mirror{half}})));
+    EXPECT_EQ(highest_peak({{"y"}, Mirror{{0.0, {}, {}}}}), 0);
+    // The narrowest of a map counts.
+    Material mapped({"y"}, rough(Distribution::ggx, 0.3, 0.3));
+    std::get<Microfacet>(mapped.lobes[0].lobe).alpha_x = Parameter::mapped(2, 2, {0.3f, 0.03f, 0.5f, 0.4f});
+    EXPECT_NEAR(lobe_shapes(mapped)[0].width, std::sqrt(0.03 * 0.3), 1e-6);
+}
 
 TEST(FacetBrdf, IsReciprocal) {
     for (const auto& [name, material] : all_materials())
