@@ -1,6 +1,7 @@
 /* LD_PRELOAD: fails the n-th call that changes a file. FAULT_AT=n (from 1), FAULT_ERRNO=ENOSPC|EIO, FAULT_ALL=1: that call and
- * all later ones of its kind (a disk that stays full). FAULT_LOG names a file that gets "CALL PATH" when a call is failed; at
- * a normal end the number of calls seen follows. Calls on pipes and terminals do not count. */
+ * all later ones (a disk that stays full). FAULT_CALL=rename (or write, pwrite, fsync, fdatasync): only such calls count.
+ * FAULT_LOG names a file that gets "CALL PATH" when a call is failed; at a normal end the number of calls seen follows. Calls on
+ * pipes and terminals do not count. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -27,7 +28,8 @@ static void record(const char* text) {
 }
 
 static int fails(const char* call, const char* path) {
-    const char* at = getenv("FAULT_AT");
+    const char *at = getenv("FAULT_AT"), *only = getenv("FAULT_CALL");
+    if (only && strcmp(only, call) != 0) return 0;
     const long n = atomic_fetch_add(&seen, 1) + 1, first = at ? atol(at) : 0;
     if (first == 0 || n < first || (n > first && !getenv("FAULT_ALL"))) return 0;
     char line[4200];
