@@ -4,6 +4,7 @@
 #include "agreement/measured.h"
 #include "base/half.h"
 #include "directions/gonio_grid.h"
+#include "measure/mesh_bias.h"
 #include "surface/generate.h"
 
 namespace gonio {
@@ -120,6 +121,15 @@ TEST(Btf, StatesTheMeanOfItsImages) {
                         stated, 2e-4 * stated);
                 }
     }
+}
+
+// What all runs have in common no run shows: the triangles of a relief two cells fine.
+TEST(Btf, DoubtsTheMeshOfACoarseRelief) {
+    const HeightField coarse = generate_gaussian(64, 64, 1, 2, 0.7, 11);
+    const double guess = predict_mesh_bias(coarse).guess;
+    ASSERT_GT(guess, 0.005);
+    const Table mean = measure_btf(coarse, gray({0.8}), btf_plan(lights, views), {}).btf.mean;
+    for (size_t k = 0; k < mean.f.size(); ++k) EXPECT_GE(mean.bias[k], 0.99 * guess * mean.f[k]) << k;
 }
 
 TEST(Btf, HasOrdersThatAddUp) {

@@ -314,6 +314,25 @@ TEST(Forward, WhatIsStillInsideIsSaid) {
     EXPECT_GT(least * pi, 0.5 * tally.remainder[0]);
 }
 
+// So are rays that run along below the top of the relief without ever meeting it.
+TEST(Forward, RaysGivenUpAreLeftOver) {
+    HeightField post = generate_plane(8, 1e-6);
+    post.heights[3 * 8 + 3] = 1e-6F;
+    const std::vector<ReceiverCell> cells = equal_cells(30);
+    const Material material = perfect_mirror();
+    const MarchGrid march = make_march_grid(post);
+    const ForwardScene scene(post, march, material, cells);
+    ForwardSettings settings;
+    settings.sub_samples = {{0.3, 0.8}};
+    const ForwardTally tally = trace_light(scene, to_vector({89.99999, 0}), settings, 1, 1, 0, {});
+    double left = 0;
+    for (const std::vector<double>& order : tally.share)
+        for (const double share : order) left += share;
+    EXPECT_GT(tally.rays_lost, 0);
+    EXPECT_GT(tally.remainder[0], 0.01);
+    EXPECT_NEAR(left + tally.remainder[0], 1, 1e-5);
+}
+
 // Large reliefs are started from some of their blocks: those of all phases together are the whole.
 TEST(Forward, BlocksAddUpToTheWhole) {
     const HeightField surface = rough(96, 96);

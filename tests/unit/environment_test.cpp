@@ -340,6 +340,12 @@ TEST(SkyIrradiance, OfCutRowsAndFineWaves) {
                 waves.radiance[j * 180 + i] =
                     static_cast<float>(1 + std::cos(2 * pi * (azimuths / 2 + azimuths % 2) * i / 180));
         expect_exact(waves, azimuths);
+        // Nor does one azimuth alone see them: on a plane alternating slices would hide it.
+        for (const SkySlice& slice : sky_slices(waves, uniform_azimuths(azimuths, 0.3))) {
+            double irradiance = 0;
+            slice.add(0, {0, 0, 1}, &irradiance);
+            EXPECT_NEAR(irradiance, pi / azimuths, 1e-3 * pi / azimuths) << azimuths;
+        }
     }
 }
 
