@@ -74,6 +74,12 @@ void describe_skips(const MeasuredScene& scene, const Stage& last, const RunValu
     }
 }
 
+void describe_turn(const RunValues& totals, Report& report) {
+    if (totals.turn > 0)
+        report.settings.emplace_back(
+            "turn", "frames turn by " + number(degrees(totals.turn)) + " degrees (rms) from facet to facet");
+}
+
 void describe_runs(const RunContext& context, const std::vector<Stage>& stages, const MeshBias& mesh_bias,
                    const RunValues& totals, Report& report) {
     const Stage& last = stages.back();
@@ -92,9 +98,7 @@ void describe_runs(const RunContext& context, const std::vector<Stage>& stages, 
                        {"links substituted at window borders", totals.substituted},
                        {"links dropped at window borders", totals.dropped},
                        {"nearly horizontal bundles given up", static_cast<double>(totals.truncated_bundles)}};
-    if (totals.turn > 0)
-        report.settings.emplace_back(
-            "turn", "frames turn by " + number(degrees(totals.turn)) + " degrees (rms) from facet to facet");
+    describe_turn(totals, report);
     report.seconds = {{"visibility and direct light", totals.seconds_direct},
                       {"operator", totals.seconds_links},
                       {"orders of scattering", totals.seconds_series}};

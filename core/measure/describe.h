@@ -13,6 +13,8 @@ std::string number(double x);
 // What every transport says: adds to settings; and to skips, counters and warnings.
 void describe_settings(const std::vector<Stage>& stages, Report& report);
 void describe_skips(const MeasuredScene& scene, const Stage& last, const RunValues& totals, Report& report);
+// Adds to settings how far frames turn on a curved base.
+void describe_turn(const RunValues& totals, Report& report);
 
 // Of the diffuse operator: adds to settings, fills counters, seconds; adds skips and warnings.
 // report.relative_error is set already.

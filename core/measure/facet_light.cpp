@@ -97,7 +97,7 @@ void FacetLight::start_run(int run) {
 
 const std::vector<Fields>& FacetLight::radiosity(const std::vector<Vec3>& lights, const Fields& irradiance) {
     if (!indirect_ || !surface_.base.is_curved()) return radiosity_.of(irradiance);
-    TurnedLight light = turned_light(grid_, unit_tile_, lights, irradiance, turn_step(turning_[0]), places_,
+    TurnedLight light = turned_light(grid_, unit_tile_, lights, irradiance, turn_step(rms_turn(turning_[0])), places_,
                                      options_.allow_skips, options_.n_threads, monitor_);
     rays_ += light.rays;
     turned_radiosity(turning_, tile_, radiosity_.albedo(), radiosity_.options(), light, options_.n_threads,

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "material/lobe_shape.h"
 #include "measure/blocks.h"
 #include "measure/windows.h"
 #include "scattering/glossy_direct.h"
+#include "scattering/turned_light.h"
 
 namespace gonio {
 namespace {
@@ -137,12 +139,29 @@ class BlockRun {
         options.keep_orders = context_.keep_orders();
         options.tolerance = context_.series_tolerance;
         const GraphSide view_side{views.arrays, &views.visible, 0};
-        for (size_t g = 0; g < materials.size(); ++g)
-            for (int first = 0; first < lights.arrays.n; first += light_block) {
-                const auto begin = lights.directions.begin() + first;
-                const int n = std::min(light_block, lights.arrays.n - first);
-                const GraphSide light_side{DirectionArrays({begin, begin + n}), &lights.visible,
-                                           static_cast<size_t>(first)};
+        std::optional<TurnNodes> nodes;
+        if (context_.surface->base.is_curved()) {
+            const double turn = rms_turn(graph);
+            values.turn = std::max(values.turn, turn);
+            nodes.emplace(context_.surface->base, turn_step(turn));
+        }
+        const int at_once = nodes ? light_block / nodes->count() : light_block;
+        for (int first = 0; first < lights.arrays.n; first += at_once) {
+            const auto begin = lights.directions.begin() + first;
+            const int n = std::min(at_once, lights.arrays.n - first);
+            GraphSide light_side;
+            TurnedLights turned;
+            if (nodes) {
+                turned = turned_lights(*context_.grid, tile, {begin, begin + n}, *nodes,
+                                       shifted_sub_samples(settings_.sub_samples, shifts_(2), shifts_(3)),
+                                       context_.allow_skips, n_threads_, monitor_);
+                values.rays += turned.rays;
+                light_side = {turned.directions, &turned.visible, 0, &*nodes};
+            } else {
+                light_side = {DirectionArrays({begin, begin + n}), &lights.visible,
+                              static_cast<size_t>(first)};
+            }
+            for (size_t g = 0; g < materials.size(); ++g) {
                 // Orders that are kept apart add up over lights, windows and runs only if all have them.
                 if (context_.plan->separate_orders)
                     options.fixed_orders =
@@ -164,6 +183,7 @@ class BlockRun {
                             sums[k](first + l, v) += found.orders[k](l, v);
                 }
             }
+        }
         values.seconds_series += thread_seconds() - clock;
     }
 
@@ -232,8 +252,10 @@ double graph_run_bytes(const GraphContext& context, const RunSettings& settings,
     // Bits and mean cosines of every direction; 15 % of the slots are pairs at slope 0.5, more on steeper
     // reliefs.
     const double sides = 8 * unknowns * (n_lights + n_views + 32),
-                 pairs = unknowns * settings.directions / 9.0 * 0.35;
-    return sides + 20 * pairs + scatter_bytes(pairs, std::min(n_lights, light_block), n_views) +
+                 pairs = unknowns * settings.directions / (s.base.corrects_horizons() ? 1.0 : 9.0) * 0.35,
+                 turned = s.base.is_curved() ? 8 * unknowns * light_block + sizeof(PairBend) * pairs : 0;
+    return sides + turned + 20 * pairs +
+           scatter_bytes(pairs, std::min(n_lights * turned_coefficients(s.base), light_block), n_views) +
            16.0 * 2 * n_lights * n_views * static_cast<double>(context.channel_groups.size());
 }
 
@@ -246,7 +268,7 @@ double lobe_share_of_pair(const Material& material, double max_slope, const Tile
 PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,
                     const RunShifts& shifts, int n_threads, const Monitor& monitor) {
     const double slope = context.grid->max_slope, z_max = slope / std::sqrt(1 + slope * slope);
-    const int subset = facet_subset(tile, settings.directions);
+    const int subset = facet_subset(tile, context.grid->base, settings.directions);
     return trace_pairs(*context.grid, tile, slab_directions(settings.directions, z_max, shifts(4), shifts(5)),
                        shifted_sub_samples(settings.directions, shifts(6), shifts(7)), subset,
                        static_cast<int>(shifts(8) * subset), n_threads, monitor);
@@ -268,7 +290,8 @@ RunValues graph_run(const GraphContext& context, const RunSettings& settings, in
             of_block.add_tile(tile, values);
         }
         Sums sums = of_block.sums();
-        if (block.same)
+        // On a curved base light that enters at one point leaves at another, whose frame counts.
+        if (block.same && !context.surface->base.is_curved())
             for (auto& orders : sums.orders)
                 for (Matrix& m : orders) symmetrise(m);
         if (slices == 0) {

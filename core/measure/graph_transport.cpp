@@ -220,6 +220,7 @@ void GraphTransport::describe(const std::vector<Stage>& stages, const RunValues&
     const Stage& last = stages.back();
     describe_settings(stages, report);
     report.settings.push_back({"orders", std::to_string(totals.applications + 1)});
+    describe_turn(totals, report);
     report.settings.push_back({"mesh_bias", (mesh_measured_ ? "two grids: " : "guessed from the relief: ") +
                                                 number(100 * mesh_doubt_) + " % of the orders beyond 1"});
     report.settings.push_back({"relative_error", number(report.relative_error)});

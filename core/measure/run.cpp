@@ -230,8 +230,9 @@ RunValues run_once(const RunContext& context, const RunSettings& settings, int s
                 const bool curved = context.surface->base.is_curved();
                 TurnedLight turned;
                 if (curved) {
-                    values.turn = std::max(values.turn, rms_turn(op));
-                    turned = turned_light(*context.grid, tile, lights, irradiance.lights, turn_step(op),
+                    const double turn = rms_turn(op);
+                    values.turn = std::max(values.turn, turn);
+                    turned = turned_light(*context.grid, tile, lights, irradiance.lights, turn_step(turn),
                                           sub_samples, context.allow_skips, n_threads, monitor);
                     values.rays += turned.rays;
                 }

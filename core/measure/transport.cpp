@@ -14,16 +14,19 @@ struct Choice {
     std::string why;
 };
 
-Choice choose(const MeasuredScene& scene) {
-    if (scene.plan->transport != TransportKind::automatic) return {scene.plan->transport, "asked for"};
-    if (!scene.plan->outgoing_cells.empty()) return {TransportKind::forward, "the receivers are cells"};
-    if (pure_lambertian(*scene.material)) return {TransportKind::diffuse, "all facets are Lambertian"};
-    return {TransportKind::pair_graph, "facets are glossy"};
-}
-
 bool has_mirror(const Material& material) {
     return std::any_of(material.lobes.begin(), material.lobes.end(),
                        [](const WeightedLobe& part) { return std::holds_alternative<Mirror>(part.lobe); });
+}
+
+Choice choose(const MeasuredScene& scene) {
+    if (scene.plan->transport != TransportKind::automatic) return {scene.plan->transport, "asked for"};
+    // Forward tracing sees flat bases alone.
+    if (!scene.plan->outgoing_cells.empty() && !scene.surface->base.is_curved())
+        return {TransportKind::forward, "the receivers are cells"};
+    if (has_mirror(*scene.material)) return {TransportKind::forward, "facets are mirrors"};
+    if (pure_lambertian(*scene.material)) return {TransportKind::diffuse, "all facets are Lambertian"};
+    return {TransportKind::pair_graph, "facets are glossy"};
 }
 
 const char* name_of(TransportKind kind) {
@@ -48,11 +51,11 @@ std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& re
     if (kind == TransportKind::diffuse && !lambertian)
         throw Error(ErrorCode::invalid_input, "/measure/transport", "diffuse",
                     "carries the light of Lambertian facets alone; leave it to \"auto\"");
-    if (scene.surface->base.is_curved() && kind != TransportKind::diffuse)
-        throw Error(
-            ErrorCode::invalid_input, "/base", "",
-            std::string("only the light of Lambertian facets is carried over a curved base, not by ") +
-                name_of(kind));
+    if (scene.surface->base.is_curved() && kind == TransportKind::forward)
+        throw Error(ErrorCode::invalid_input, "/base", "",
+                    std::string("light is not traced forward over a curved base") +
+                        (has_mirror(*scene.material) ? ", and nothing else takes mirrors"
+                                                     : R"(: leave "transport" to "auto")"));
     const std::string cells = R"({"cells": "klems_full"} or {"cells": {"equal": N}})";
     if (scene.plan->outgoing_cells.empty() && has_mirror(*scene.material))
         throw Error(ErrorCode::invalid_input, "/measure/outgoing", "directions",

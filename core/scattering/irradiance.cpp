@@ -52,11 +52,7 @@ void expand_directions(const MarchGrid& grid, const Tile& tile, const std::vecto
                 }
                 const FacetPoint point = facet_point(kind, sample.a, sample.b, tile.refinement, part);
                 counts.marched += rays;
-                if (grid.base.corrects_horizons()) {
-                    corrected_visible(grid, d, point, tile.area, to);
-                    return;
-                }
-                counts.truncated += visible_along(grid, d, point, max_march_travel, tile.area, to);
+                counts.truncated += visible_on_base(grid, d, point, max_march_travel, tile.area, to);
             });
             constexpr size_t chunk = 1024;
             float* to = out.block(block) + part * tile.n_slots() * column_block;

@@ -7,38 +7,11 @@
 #include "base/parallel.h"
 #include "scattering/moved_directions.h"
 #include "scattering/ray_hits.h"
-#include "visibility/curvature.h"
+#include "scattering/turning.h"
 #include "visibility/march.h"
 
 namespace gonio {
 namespace {
-
-// How the frame turns along a ray.
-struct Turning {
-    double rate = 0;         // radians per cell of travel,
-    double towards[2] = {};  // towards this horizontal direction
-    double about[2] = {};    // and its parts along the principal directions of the base
-
-    Vec3 turned(const Vec3& direction, double travel) const {
-        return turned_direction(direction, rate * travel, towards[0], towards[1]);
-    }
-};
-Turning turning_along(const MarchGrid& grid, const Vec3& direction) {
-    Turning turning;
-    const MarchDirection step = to_march_direction(grid, direction);
-    const double x = step.step_x * grid.pitch_x, y = step.step_y * grid.pitch_y;
-    const BaseCurvature::Tensor k = grid.base.tensor();
-    const double turn_x = k.xx * x + k.xy * y, turn_y = k.xy * x + k.yy * y;
-    const double c = std::cos(grid.base.direction), s = std::sin(grid.base.direction);
-    turning.rate = std::hypot(turn_x, turn_y);
-    if (turning.rate > 0) {
-        turning.towards[0] = turn_x / turning.rate;
-        turning.towards[1] = turn_y / turning.rate;
-    }
-    turning.about[0] = c * turn_x + s * turn_y;
-    turning.about[1] = c * turn_y - s * turn_x;
-    return turning;
-}
 
 // One ray bundle of the operator: a direction from one part of one facet kind.
 struct OperatorBundle {
@@ -169,9 +142,7 @@ void append_records(const Tile& tile, const LineGroup& group, const std::vector<
         chunk.links[at] = pending.links[k].link;
         if (!base.is_curved()) continue;
         const LinkOrigin& origin = pending.origins[k];
-        const double* about = turnings[origin.direction].about;
-        chunk.turns[at] = {
-            {static_cast<float>(origin.travel * about[0]), static_cast<float>(origin.travel * about[1])}};
+        chunk.turns[at] = turnings[origin.direction].turn(origin.travel);
         if (base.corrects_horizons()) chunk.origins[at] = origin;
     }
 }

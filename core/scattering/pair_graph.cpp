@@ -23,11 +23,11 @@ struct PairBatch {
         for (auto* axis : {&x, &y, &z}) axis->clear();
         slot.clear();
     }
-    void add(const DirectionArrays& directions, uint32_t direction, float sign, size_t at) {
+    void add(const PairDirection& d, float sign, size_t at) {
         slot.push_back(static_cast<uint32_t>(at));
-        x.push_back(sign * directions.x[direction]);
-        y.push_back(sign * directions.y[direction]);
-        z.push_back(sign * directions.z[direction]);
+        x.push_back(sign * d.x);
+        y.push_back(sign * d.y);
+        z.push_back(sign * d.z);
     }
 };
 
@@ -43,6 +43,7 @@ class Sweep {
           n_threads_(n_threads),
           monitor_(monitor),
           columns_(lights.directions.x.size()),
+          wanted_(lights.nodes ? lights.n_lights() : columns_),
           core_area_(core_areas(tile)) {}
 
     size_t size() const { return graph_.size() * columns_; }
@@ -53,12 +54,14 @@ class Sweep {
         for_chunks([&](size_t begin, size_t end) {
             PairBatch batch;
             for (size_t e = begin; e < end; ++e)
-                batch.add(graph_.directions, graph_.direction[e], -1, graph_.seen[e] % tile_.n_slots());
+                batch.add(graph_.arriving_at(e), -1, graph_.seen[e] % tile_.n_slots());
             float* out = &radiance[begin * columns_];
             rows(batch, lights_.directions, out);
+            std::vector<float> scratch(columns_);
             for (size_t e = begin; e < end; ++e, out += columns_) {
                 const float* g = lights_.visible->of(graph_.seen[e]) + lights_.first;
                 for (size_t c = 0; c < columns_; ++c) out[c] *= g[c];
+                turn_back(e, out, scratch);
             }
         });
     }
@@ -72,7 +75,7 @@ class Sweep {
             monitor_.check_cancelled();
             PairBatch batch;
             DirectionArrays leaving;
-            std::vector<float> weights, cosines;
+            std::vector<float> weights, cosines, scratch(columns_);
             const size_t begin = tile_.n_unknowns() * task / n_tasks,
                          end = tile_.n_unknowns() * (task + 1) / n_tasks;
             for (size_t u = begin; u < end; ++u) {
@@ -84,16 +87,15 @@ class Sweep {
                     for (auto* axis : {&leaving.x, &leaving.y, &leaving.z}) axis->assign(padded, 0.0f);
                     cosines.resize(n);
                     for (size_t t = 0; t < n; ++t) {
-                        const uint32_t j = graph_.direction[first + t];
-                        leaving.x[t] = graph_.directions.x[j];
-                        leaving.y[t] = graph_.directions.y[j];
-                        leaving.z[t] = graph_.directions.z[j];
-                        cosines[t] = static_cast<float>(graph_.solid_angle) * cosine(slot, j);
+                        const PairDirection d = graph_.leaving(first + t);
+                        leaving.x[t] = d.x;
+                        leaving.y[t] = d.y;
+                        leaving.z[t] = d.z;
+                        cosines[t] = graph_.solid_angle_of(first + t) * cosine(slot, d);
                     }
                     batch.clear();
                     for (size_t k = 0; k < arriving; ++k)
-                        batch.add(graph_.directions, graph_.direction[graph_.arriving[graph_.in[u] + k]], -1,
-                                  slot);
+                        batch.add(graph_.arriving_at(graph_.arriving[graph_.in[u] + k]), -1, slot);
                     weights.resize(arriving * padded);
                     rows(batch, leaving, weights.data());
                 }
@@ -104,8 +106,12 @@ class Sweep {
                         largest[task] = std::max(largest[task], w[t]);
                     }
                     const size_t e = graph_.arriving[graph_.in[u] + k];
+                    float* sum = total ? &(*total)[e * columns_] : nullptr;
                     combine_rows(w, n, from.data() + first * columns_, columns_, &to[e * columns_],
-                                 total ? &(*total)[e * columns_] : nullptr);
+                                 lights_.nodes ? nullptr : sum);
+                    if (!lights_.nodes) continue;
+                    turn_back(e, &to[e * columns_], scratch);
+                    for (size_t c = 0; sum && c < columns_; ++c) sum[c] += to[e * columns_ + c];
                 }
             }
         });
@@ -115,7 +121,7 @@ class Sweep {
     // What the views receive.
     Matrix received(const HugeFloats& radiance) const {
         [[maybe_unused]] static const bool single_threaded_blas = (openblas_set_num_threads(1), true);
-        const size_t padded = views_.directions.x.size(), panel = columns_ * padded;
+        const size_t padded = views_.directions.x.size(), panel = wanted_ * padded;
         const size_t n_chunks = (graph_.size() + chunk_pairs - 1) / chunk_pairs;
         const int n_groups =
             static_cast<int>(std::clamp<size_t>((size_t{64} << 20) / (panel * sizeof(double)), 2, 16));
@@ -129,25 +135,25 @@ class Sweep {
                 const size_t begin = k * chunk_pairs, end = std::min(begin + chunk_pairs, graph_.size());
                 batch.clear();
                 for (size_t e = begin; e < end; ++e)
-                    batch.add(graph_.directions, graph_.direction[e], 1, graph_.start[e] % tile_.n_slots());
+                    batch.add(graph_.leaving(e), 1, graph_.start[e] % tile_.n_slots());
                 y.resize((end - begin) * padded);
                 rows(batch, views_.directions, y.data());
                 for (size_t e = begin; e < end; ++e) {
                     const size_t slot = batch.slot[e - begin];
-                    const float weight = core_area_[slot] * static_cast<float>(graph_.solid_angle) *
-                                         cosine(slot, graph_.direction[e]);
+                    const float weight =
+                        core_area_[slot] * graph_.solid_angle_of(e) * cosine(slot, graph_.leaving(e));
                     const float* g = views_.visible->of(graph_.start[e]) + views_.first;
                     float* row = &y[(e - begin) * padded];
                     for (size_t c = 0; c < padded; ++c) row[c] *= weight * g[c];
                 }
-                cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, static_cast<int>(columns_),
+                cblas_sgemm(CblasRowMajor, CblasTrans, CblasNoTrans, static_cast<int>(wanted_),
                             static_cast<int>(padded), static_cast<int>(end - begin), 1.0f,
                             &radiance[begin * columns_], static_cast<int>(columns_), y.data(),
                             static_cast<int>(padded), 0.0f, product.data(), static_cast<int>(padded));
                 for (size_t c = 0; c < panel; ++c) partial[group][c] += product[c];
             }
         });
-        Matrix sum(lights_.directions.n, views_.directions.n);
+        Matrix sum(lights_.n_lights(), views_.directions.n);
         for (int l = 0; l < sum.rows; ++l)
             for (int v = 0; v < sum.columns; ++v)
                 for (const auto& p : partial) sum(l, v) += p[l * padded + v];
@@ -162,9 +168,9 @@ class Sweep {
             const size_t slot = graph_.start[e] % tile_.n_slots();
             const float* row = &radiance[e * columns_];
             float sum = 0;
-            for (size_t c = 0; c < columns_; ++c) sum += row[c];
+            for (size_t c = 0; c < wanted_; ++c) sum += row[c];
             total += static_cast<double>(tile_.sqrt_area[slot]) * tile_.sqrt_area[slot] *
-                     cosine(slot, graph_.direction[e]) * sum;
+                     cosine(slot, graph_.leaving(e)) * sum;
         }
         return total * graph_.solid_angle * static_cast<double>(step);
     }
@@ -173,7 +179,7 @@ class Sweep {
         for (size_t u = 0; u < tile_.n_unknowns(); ++u) {
             const float* row = lights_.visible->of(u) + lights_.first;
             float sum = 0;
-            for (size_t c = 0; c < columns_; ++c) sum += row[c];
+            for (size_t c = 0; c < wanted_; ++c) sum += row[c];
             const double root = tile_.sqrt_area[u % tile_.n_slots()];
             total += root * root * sum;
         }
@@ -181,10 +187,14 @@ class Sweep {
     }
 
   private:
-    float cosine(size_t slot, uint32_t direction) const {
-        return std::max(0.0f, tile_.normal_x[slot] * graph_.directions.x[direction] +
-                                  tile_.normal_y[slot] * graph_.directions.y[direction] +
-                                  tile_.normal_z[slot] * graph_.directions.z[direction]);
+    float cosine(size_t slot, const PairDirection& d) const {
+        return std::max(0.0f,
+                        tile_.normal_x[slot] * d.x + tile_.normal_y[slot] * d.y + tile_.normal_z[slot] * d.z);
+    }
+    // The lights of a row, told where the pair ends, as they are told where it starts.
+    void turn_back(size_t pair, float* row, std::vector<float>& scratch) const {
+        if (lights_.nodes)
+            lights_.nodes->shift(graph_.bends[pair].turn, lights_.n_lights(), row, scratch.data());
     }
     void rows(const PairBatch& batch, const DirectionArrays& directions, float* out) const {
         lobe_rows(material_, tile_, batch.slot.size(), batch.slot.data(), batch.x.data(), batch.y.data(),
@@ -206,6 +216,7 @@ class Sweep {
     int n_threads_;
     const Monitor& monitor_;
     size_t columns_;
+    size_t wanted_;  // the first of them: of lights that are not turned
     std::vector<float> core_area_;
 };
 
@@ -262,7 +273,24 @@ GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotM
 HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
                           const GraphSide& lights, const GraphOptions& options, int n_threads,
                           const Monitor& monitor, GraphOrders& series) {
-    return sweep_orders(Sweep(graph, tile, material, lights, lights, n_threads, monitor), options, series);
+    HugeFloats all =
+        sweep_orders(Sweep(graph, tile, material, lights, lights, n_threads, monitor), options, series);
+    if (!lights.nodes) return all;
+    const size_t n = lights.n_lights(), padded = (n + 15) / 16 * 16, columns = lights.directions.padded();
+    HugeFloats wanted(graph.size() * padded);
+    for (size_t e = 0; e < graph.size(); ++e) {
+        std::copy_n(&all[e * columns], n, &wanted[e * padded]);
+        std::fill_n(&wanted[e * padded + n], padded - n, 0.0f);
+    }
+    return wanted;
+}
+
+double rms_turn(const PairGraph& graph) {
+    double sum = 0;
+    for (const PairBend& bend : graph.bends)
+        sum += static_cast<double>(bend.turn.about[0]) * bend.turn.about[0] +
+               static_cast<double>(bend.turn.about[1]) * bend.turn.about[1];
+    return graph.bends.empty() ? 0 : std::sqrt(sum / static_cast<double>(graph.bends.size()));
 }
 
 double scatter_bytes(double n_pairs, int n_lights, int n_views) {

@@ -37,6 +37,11 @@ struct Builder {
             tile, [&](size_t slot, int, int i, int j) { values[slot] = static_cast<float>(value(i, j)); });
         return values;
     }
+    // Of the displaced facet on a curved base.
+    Gradient gradient_of(size_t slot, int kind, int i, int j) const {
+        if (!surface.base.is_curved()) return facet_gradient(surface, kind, i, j);
+        return {-tile.normal_x[slot] / tile.normal_z[slot], -tile.normal_y[slot] / tile.normal_z[slot]};
+    }
     CellValue value_of(const Parameter& p) const {
         return [&p, this](int i, int j) { return p.at(channel, i, j); };
     }
@@ -74,7 +79,7 @@ struct Builder {
                                &lobe.bitangent_y, &lobe.bitangent_z})
                 axis->assign(tile.n_slots(), 0.0f);
             for_each_facet(tile, [&](size_t slot, int kind, int i, int j) {
-                const LocalFrame frame(facet_gradient(surface, kind, i, j), m.rotation_deg.at(0, i, j));
+                const LocalFrame frame(gradient_of(slot, kind, i, j), m.rotation_deg.at(0, i, j));
                 const double x = alpha_x(i, j), y = alpha_y(i, j);
                 lobe.tangent_x[slot] = static_cast<float>(frame.tangent.x / x);
                 lobe.tangent_y[slot] = static_cast<float>(frame.tangent.y / x);

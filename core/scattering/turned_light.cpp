@@ -37,8 +37,8 @@ double rms_turn(const LinkOperator& op) {
     return total > 0 ? std::sqrt(sum / total) : 0;
 }
 
-double turn_step(const LinkOperator& op) {
-    return std::clamp(1.5 * rms_turn(op), 1e-3, 0.3);
+double turn_step(double rms_turn) {
+    return std::clamp(1.5 * rms_turn, 1e-3, 0.3);
 }
 
 int turned_coefficients(const BaseCurvature& base) {

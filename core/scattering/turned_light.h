@@ -21,8 +21,9 @@ struct TurnedLight {
 
 // rms of the turns along the links, weighted as light is; radians.
 double rms_turn(const LinkOperator& op);
-// How far lights are best turned for the polynomial: 1.5 times that; most turns lie within.
-double turn_step(const LinkOperator& op);
+// How far lights are best turned for the polynomial, from the rms of the turns: 1.5 times that; most turns lie
+// within.
+double turn_step(double rms_turn);
 // Coefficients that a light takes on a base: 1 on a flat one.
 int turned_coefficients(const BaseCurvature& base);
 

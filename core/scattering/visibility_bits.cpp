@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.h"
-#include "visibility/march.h"
+#include "visibility/corrected_horizon.h"
 
 namespace gonio {
 
@@ -52,9 +52,8 @@ VisibilityBits find_visibility(const MarchGrid& grid, const Tile& tile, const st
                 for (size_t s = 0; s < sub_samples.size(); ++s) {
                     const FacetPoint point =
                         facet_point(kind, sub_samples[s].a, sub_samples[s].b, tile.refinement, part);
-                    const RayBundle bundle = make_ray_bundle(grid, direction, point, max_march_travel);
-                    march_visible(grid, bundle, tile.area, words.data());
-                    counts[d].truncated += bundle.truncated;
+                    counts[d].truncated +=
+                        visible_on_base(grid, direction, point, max_march_travel, tile.area, words.data());
                     uint32_t* slots = to + part * tile.n_slots() + kind * half;
                     for (size_t w = 0; w < words.size(); ++w, slots += march_block) {
                         if (words[w] == 0) continue;

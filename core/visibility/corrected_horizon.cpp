@@ -43,4 +43,12 @@ void corrected_visible(const MarchGrid& grid, const Vec3& direction, const Facet
         }
 }
 
+bool visible_on_base(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start, double max_travel,
+                     const CellRect& rect, uint32_t* visible) {
+    if (!grid.base.corrects_horizons())
+        return visible_along(grid, direction, start, max_travel, rect, visible);
+    corrected_visible(grid, direction, start, rect, visible);
+    return false;
+}
+
 }  // namespace gonio

@@ -12,4 +12,9 @@ namespace gonio {
 void corrected_visible(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start,
                        const CellRect& rect, uint32_t* visible);
 
+// All rays of a direction as the base asks for: bent, or by corrected horizons. Returns whether a bundle was
+// truncated.
+bool visible_on_base(const MarchGrid& grid, const Vec3& direction, const FacetPoint& start, double max_travel,
+                     const CellRect& rect, uint32_t* visible);
+
 }  // namespace gonio

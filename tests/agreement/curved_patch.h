@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "material/local_frame.h"
 #include "surface/generate.h"
 #include "surface/height_field.h"
 #include "visibility/curvature.h"
@@ -28,9 +29,6 @@ inline Vec3 operator-(const Vec3& a, const Vec3& b) {
 }
 inline Vec3 operator*(double s, const Vec3& a) {
     return {s * a.x, s * a.y, s * a.z};
-}
-inline Vec3 cross(const Vec3& a, const Vec3& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
 // Cells [x0, x0 + core) x [y0, y0 + core) of a surface with `margin` cells around them. Exact for cylinders;
@@ -98,6 +96,15 @@ class CurvedPatch {
         p.x = base_x(i + margin_) + u * s_.pitch_x;
         p.y = base_y(j + margin_) + v * s_.pitch_y;
         return p;
+    }
+
+    // Of the core, from four random numbers in [0, 1): every facet with the same odds.
+    Point point_of(const std::array<double, 4>& random) const {
+        const int cell = std::min(static_cast<int>(random[0] * core_ * core_), core_ * core_ - 1);
+        double u = random[1], v = random[2];
+        const int kind = random[3] < 0.5 ? 0 : 1;
+        if ((kind == 0) != (u >= v)) std::swap(u, v);
+        return point(cell % core_, cell / core_, kind, u, v);
     }
 
     // What is seen at (x, y), in cells of the core, of the base from far away: a ray towards `view`, told in
@@ -228,12 +235,8 @@ inline std::vector<TracedOrders> trace_view(const std::vector<CurvedPatch*>& pat
     };
     for (int path = 0; path < paths; ++path) {
         const CurvedPatch& patch = *patches[path % patches.size()];
-        const int cell = std::min(static_cast<int>(random(path, 0, 0) * patch.core() * patch.core()),
-                                  patch.core() * patch.core() - 1);
-        double u = random(path, 0, 1), v = random(path, 0, 2);
-        const int kind = random(path, 0, 3) < 0.5 ? 0 : 1;
-        if ((kind == 0) != (u >= v)) std::swap(u, v);
-        CurvedPatch::Point p = patch.point(cell % patch.core(), cell / patch.core(), kind, u, v);
+        CurvedPatch::Point p =
+            patch.point_of({random(path, 0, 0), random(path, 0, 1), random(path, 0, 2), random(path, 0, 3)});
         CurvedPatch::Point hit;
         double start = 1;
         if (view) {
