@@ -23,7 +23,9 @@ class TurnNodes {
     TurnNodes(const BaseCurvature& base, double step);
 
     int count() const { return static_cast<int>(nodes_.size()); }
-    // [node][light]; node 0 is the lights themselves.
+    // Radians towards the principal directions of the base; node 0 is at 0.
+    const std::vector<std::array<double, 2>>& turns() const { return nodes_; }
+    // [node][light]
     std::vector<Vec3> turned(const std::vector<Vec3>& lights) const;
     // Values of the nodes as the start of a pair tells them, from what its end does. rows: [node][n], in
     // place; scratch of that size.

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "scattering/turn_nodes.h"
 #include "scattering/turned_radiosity.h"
 #include "surface/generate.h"
 #include "visibility/curvature.h"
@@ -169,6 +170,40 @@ TEST(LinkTurns, GrowWithTheCurvature) {
         return rms_turn(build_link_operator(grid, tile, slab_directions(32, 0.8, 0.1, 0.2), jitter, 1, {}));
     };
     EXPECT_NEAR(turn(2e-6) / turn(1e-6), 2, 0.05);
+}
+
+// Polynomials of second degree go from their values at the nodes to those where the light has turned, and
+// node m's light is the light turned by it.
+TEST_P(TurnedLightOn, NodesCarryPolynomials) {
+    const TurnNodes nodes(GetParam(), 0.1);
+    const bool both = GetParam().kappa_1 != 0 && GetParam().kappa_2 != 0;
+    ASSERT_EQ(nodes.count(), both ? 6 : 3);
+    const LinkTurn turn{{GetParam().kappa_1 != 0 ? 0.07f : 0.0f, GetParam().kappa_2 != 0 ? -0.16f : 0.0f}};
+    auto value = [&](double a, double b, int column) {
+        const double x = a + b * 0.3;
+        return 1 + column + 3 * a - 2 * b + 5 * x * x - column * a * b + 4 * b * b;
+    };
+    std::vector<float> rows, expected, scratch;
+    for (const auto& [a, b] : nodes.turns())
+        for (int column = 0; column < 5; ++column) {
+            rows.push_back(static_cast<float>(value(a, b, column)));
+            expected.push_back(static_cast<float>(value(a + turn.about[0], b + turn.about[1], column)));
+        }
+    scratch.resize(rows.size());
+    nodes.shift(turn, 5, rows.data(), scratch.data());
+    for (size_t k = 0; k < rows.size(); ++k) EXPECT_NEAR(rows[k], expected[k], 1e-5) << k;
+
+    const std::vector<Vec3> lamps{to_vector({30, 40}), to_vector({70, 200})}, turned = nodes.turned(lamps);
+    const double c = std::cos(GetParam().direction), s = std::sin(GetParam().direction);
+    for (int m = 0; m < nodes.count(); ++m) {
+        // At the base offset where the frame has turned so.
+        const double x = both || GetParam().kappa_1 != 0 ? nodes.turns()[m][0] / GetParam().kappa_1 : 0,
+                     y = both || GetParam().kappa_2 != 0 ? nodes.turns()[m][1] / GetParam().kappa_2 : 0;
+        for (size_t l = 0; l < lamps.size(); ++l) {
+            const Vec3 there = turned_direction(lamps[l], GetParam(), c * x - s * y, s * x + c * y);
+            EXPECT_NEAR(dot(turned[m * lamps.size() + l], there), 1, 1e-12);
+        }
+    }
 }
 
 }  // namespace
