@@ -63,7 +63,7 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
 
 double GlossyPixels::lobe_share_of_pair() const {
     return context_.indirect && plan_.max_order != 1
-               ? gonio::lobe_share_of_pair(material_, grid_.max_slope, tile_, samples_.directions)
+               ? gonio::lobe_share_of_pair(material_, grid_, tile_, samples_.directions)
                : 0.0;
 }
 

@@ -259,10 +259,11 @@ double graph_run_bytes(const GraphContext& context, const RunSettings& settings,
            16.0 * 2 * n_lights * n_views * static_cast<double>(context.channel_groups.size());
 }
 
-double lobe_share_of_pair(const Material& material, double max_slope, const Tile& tile, int n_directions) {
-    const double z_max = max_slope / std::sqrt(1 + max_slope * max_slope);
-    return highest_peak(material) * 4 * pi * z_max / n_directions * facet_subset(tile, n_directions) *
-           tile.n_parts();
+double lobe_share_of_pair(const Material& material, const MarchGrid& grid, const Tile& tile,
+                          int n_directions) {
+    const double slope = grid.max_slope, z_max = slope / std::sqrt(1 + slope * slope);
+    return highest_peak(material) * 4 * pi * z_max / n_directions *
+           facet_subset(tile, grid.base, n_directions) * tile.n_parts();
 }
 
 PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,

@@ -237,7 +237,7 @@ void GraphTransport::describe(const std::vector<Stage>& stages, const RunValues&
     describe_skips(context_, last, totals, report);
     if (!context_.transports()) return;
     const double share =
-        lobe_share_of_pair(*context_.material, context_.grid->max_slope,
+        lobe_share_of_pair(*context_.material, *context_.grid,
                            run_tiles(context_, last.settings, 0, 0).front(), last.settings.directions);
     if (share > most_honest_share)
         report.warnings.push_back(
