@@ -44,7 +44,8 @@ def run_projection(job: JobDocument | None = None, /, *, program: str = "gonio",
     """Runs a job whose measure has a member "project" by `gonio run`. As run() else.
 
     >>> sparse = {"kind": "brdf", "incident": measure["incident"], "project": {"order": 4, "samples": 100}}
-    >>> projection = gonio.run_projection(surface=surface, material=material, measure=sparse, program=program)
+    >>> quick = {"samples": {"replicates": 4}}
+    >>> projection = gonio.run_projection(surface=surface, material=material, measure=sparse, accuracy=quick, program=program)
     >>> projection.f(0, 0, 30, 0).shape
     ()
     """
