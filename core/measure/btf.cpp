@@ -62,13 +62,8 @@ class Measurement {
           lights_(vectors(plan.incident)),
           views_(vectors(view_angles(surface, plan))),
           started_(std::chrono::steady_clock::now()),
-          light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor) {
-        if (surface.base.is_curved() && (plan.cameras || surface.base.corrects_horizons()))
-            throw Error(
-                ErrorCode::invalid_input, "/base", "",
-                plan.cameras
-                    ? "cameras at a finite distance see flat bases only; ask for \"outgoing\" directions"
-                    : "\"correction\" is for BRDFs and maps: views of a BTF are bent, not corrected");
+          light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor),
+          bent_grid_(bent_view_grid(surface, plan)) {
         btf().shape = btf_shape(surface, material, plan, samples_of(plan).refinement);
         btf().mean.channels = material.channels;
         btf().mean.incident = plan.incident;
@@ -142,7 +137,7 @@ class Measurement {
 
     std::vector<uint32_t> view_maps(const BtfShape& shape, const std::vector<int>& views,
                                     const SubSample& place) {
-        return make_view_maps(surface_, light_.grid(), plan_, shape, views, place,
+        return make_view_maps(surface_, bent_grid_ ? *bent_grid_ : light_.grid(), plan_, shape, views, place,
                               light_.samples().refinement, options_.n_threads, monitor_, unresolved_);
     }
 
@@ -337,6 +332,7 @@ class Measurement {
     std::vector<Vec3> lights_, views_;
     std::chrono::steady_clock::time_point started_;
     FacetLight light_;
+    std::optional<MarchGrid> bent_grid_;  // of the views
     BtfResult result_;
     std::optional<PixelMeans> pixel_means_;
     std::vector<int> probed_views_;  // with other places of the pixels

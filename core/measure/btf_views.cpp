@@ -85,6 +85,16 @@ std::vector<Vec3> camera_places(const HeightField& s, const BtfPlan& plan) {
     return places;
 }
 
+std::optional<MarchGrid> bent_view_grid(const HeightField& surface, const BtfPlan& plan) {
+    if (surface.base.is_curved() && plan.cameras)
+        throw Error(ErrorCode::invalid_input, "/base", "",
+                    "cameras at a finite distance see flat bases only; ask for \"outgoing\" directions");
+    if (!surface.base.corrects_horizons()) return std::nullopt;
+    HeightField bent = surface;
+    bent.base.correction = BaseCorrection::none;
+    return make_march_grid(bent);
+}
+
 std::vector<uint32_t> make_view_maps(const HeightField& surface, const MarchGrid& grid, const BtfPlan& plan,
                                      const BtfShape& shape, const std::vector<int>& views,
                                      const SubSample& place, int refinement, int n_threads,

@@ -1,5 +1,7 @@
 // What the views of a BTF or light field see, apart from the light. Internal to measure/.
 #pragma once
+#include <optional>
+
 #include "measure/btf.h"
 #include "scattering/irradiance.h"
 #include "visibility/march_grid.h"
@@ -18,6 +20,10 @@ Vec3 pixel_to_camera(const HeightField& surface, double plane_height, const Vec3
 // Directions of the views. Those of cameras from the middle of what they see: names for the rows of the
 // means.
 std::vector<AnglesDeg> view_angles(const HeightField& surface, const BtfPlan& plan);
+
+// The grid that views march where it is not that of the light: what a bent base shows is bent, also where its
+// shadows are corrected ones of the flat relief. Throws Error("/base") for cameras over a curved base.
+std::optional<MarchGrid> bent_view_grid(const HeightField& surface, const BtfPlan& plan);
 
 // As Btf::view_maps, of some of the views. place: in [0, 1)^2, where inside the pixels the sampled places
 // begin; pixel_centre for those of a BTF. unresolved: nearly horizontal rays that were given up. Throws Error

@@ -42,7 +42,8 @@ class GlossyBtf::Measurement {
           samples_(samples_of(plan)),
           shape_(btf_shape(surface, material, plan, samples_.refinement)),
           started_(std::chrono::steady_clock::now()),
-          pixels_(surface, material, plan, samples_, options, monitor) {
+          pixels_(surface, material, plan, samples_, options, monitor),
+          bent_grid_(bent_view_grid(surface, plan)) {
         for (int k = 0, n = std::min(most_probes, shape_.n_views); k < n; ++k)
             probes_.push_back(static_cast<int>((k + 0.5) * shape_.n_views / n));
         while (wants_more()) {
@@ -117,8 +118,8 @@ class GlossyBtf::Measurement {
     // images: [light][channel][pixel] of the view, or empty if they are not wanted.
     ViewSums of_view(const BtfShape& shape, int view, const SubSample& place, std::span<uint16_t> images) {
         const std::vector<uint32_t> map =
-            make_view_maps(surface_, pixels_.grid(), plan_, shape, {view}, place, samples_.refinement,
-                           options_.n_threads, monitor_, unresolved_);
+            make_view_maps(surface_, bent_grid_ ? *bent_grid_ : pixels_.grid(), plan_, shape, {view}, place,
+                           samples_.refinement, options_.n_threads, monitor_, unresolved_);
         const size_t n_lights = shape.n_lights, planes = shape.n_channels * n_lights, runs = pixels_.n_runs(),
                      n_pixels = shape.n_pixels();
         constexpr size_t chunk = 256;
@@ -245,6 +246,7 @@ class GlossyBtf::Measurement {
     BtfShape shape_;
     std::chrono::steady_clock::time_point started_;
     GlossyPixels pixels_;
+    std::optional<MarchGrid> bent_grid_;
     std::vector<int> probes_;  // views that are judged by
     std::vector<double> places_;
     Report report_;
@@ -280,7 +282,8 @@ Prediction predict_glossy_btf(const HeightField& surface, const Material& materi
             (1e-6 + 20e-9 * lights * samples.sub_samples + 2e-9 * channels * lights * samples.directions);
     if (plan.accuracy.max_seconds)
         prediction.cpu_seconds = std::min(prediction.cpu_seconds, *plan.accuracy.max_seconds);
-    prediction.memory_bytes = (64 << 20) + samples.replicates * glossy_run_bytes(shape, samples) +
+    prediction.memory_bytes = (64 << 20) +
+                              samples.replicates * glossy_run_bytes(shape, samples, surface.base) +
                               2.0 * static_cast<double>(shape.images_size()) / shape.n_views;
     prediction.table_bytes = 2.0 * static_cast<double>(shape.images_size());
     return prediction;

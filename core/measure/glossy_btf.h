@@ -13,7 +13,8 @@ namespace gonio {
 class GlossyBtf {
   public:
     // All but the pictures: the light of as many random runs as the accuracy needs, judged by a few views.
-    // The references must outlive it. Throws Error: for mirrors and curved bases; limit; cancelled.
+    // The references must outlive it. Throws Error: for mirrors, and for cameras over curved bases; limit;
+    // cancelled.
     GlossyBtf(const HeightField& surface, const Material& material, const BtfPlan& plan,
               const RunOptions& options, const Monitor& monitor);
     ~GlossyBtf();

@@ -3,21 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "base/error.h"
 #include "measure/btf_views.h"
 #include "measure/describe.h"
+#include "scattering/turned_light.h"
+#include "visibility/curvature.h"
 #include "visibility/march.h"
 
 namespace gonio {
 namespace {
 
-constexpr int light_block = 64;  // that are swept through the graph together
+constexpr size_t light_block = 64;  // lights, or turned ones, that are swept through the graph together
 
-void require_supported(const HeightField& surface, const Material& material) {
-    if (surface.base.is_curved())
-        throw Error(ErrorCode::invalid_input, "/base", "",
-                    "pictures of glossy facets are measured on a flat base");
+void require_pictures(const Material& material) {
     for (const WeightedLobe& part : material.lobes)
         if (std::holds_alternative<Mirror>(part.lobe))
             throw Error(ErrorCode::invalid_input, "/material", "mirror",
@@ -25,13 +25,28 @@ void require_supported(const HeightField& surface, const Material& material) {
                         "needs a lobe of some width, as ggx");
 }
 
+// Of the middle of the facet on every slot.
+std::vector<float> facet_heights(const HeightField& s, const Tile& tile) {
+    std::vector<float> heights(tile.n_slots(), 0.0f);
+    for (int kind = 0; kind < 2; ++kind)
+        for (int j = 0; j < s.ny; ++j)
+            for (int i = 0; i < s.nx; ++i)
+                heights[tile.slot(kind, j, i)] =
+                    (s.at(i, j) + (kind == 0 ? s.at(i + 1, j) : s.at(i, j + 1)) + s.at(i + 1, j + 1)) / 3;
+    return heights;
+}
+
 }  // namespace
 
-double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples) {
+double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples, const BaseCurvature& base) {
     const double unknowns = static_cast<double>(shape.n_facets), lights = (shape.n_lights + 15) / 16 * 16.0,
-                 pairs = unknowns * samples.directions / 9.0 * 0.35, bits = 4 * unknowns * shape.n_lights;
-    return 4 * unknowns * lights + bits + pairs * (20 + 4 * lights * shape.n_channels) +
-           scatter_bytes(pairs, std::min(light_block, shape.n_lights), 16);
+                 pairs = unknowns * samples.directions / (base.corrects_horizons() ? 1.0 : 9.0) * 0.35,
+                 bits = 4 * unknowns * shape.n_lights;
+    const int swept = std::min<int>(light_block, shape.n_lights * turned_coefficients(base));
+    const double bends =
+        base.is_curved() ? pairs * sizeof(PairBend) + 4 * unknowns * lights * turned_coefficients(base) : 0;
+    return 4 * unknowns * lights + bits + bends + pairs * (20 + 4 * lights * shape.n_channels) +
+           scatter_bytes(pairs, swept, 16);
 }
 
 GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material, const BtfPlan& plan,
@@ -43,7 +58,8 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
       options_(options),
       monitor_(monitor),
       material_(simplified(material)) {
-    require_supported(surface, material);
+    check_base(surface);
+    require_pictures(material);
     grid_ = make_march_grid(surface);
     const CellRect all{0, 0, surface.nx, surface.ny};
     tile_ = make_tile(surface, all, all, samples.refinement);
@@ -52,13 +68,14 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
     for (size_t c = 0; c < material.channels.size(); ++c)
         materials_.push_back(slot_material(material_, surface, tile_, c));
     for (const AnglesDeg& light : plan.incident) lights_.push_back(to_vector(light));
-    for (size_t first = 0; first < lights_.size(); first += light_block)
-        light_blocks_.push_back(DirectionArrays(
-            {lights_.begin() + static_cast<long>(first),
-             lights_.begin() + static_cast<long>(std::min(lights_.size(), first + light_block))}));
+    if (surface.base.is_curved()) lights_at_once_ = light_block / turned_coefficients(surface.base);
+    for (size_t b = 0; b * lights_at_once_ < lights_.size(); ++b)
+        light_blocks_.push_back(DirectionArrays(lights_of(b)));
     if (plan.cameras) cameras_ = camera_places(surface, plan);
     plane_height_ = view_plane_height(surface, plan);
-    run_bytes_ = glossy_run_bytes(btf_shape(surface, material, plan, samples.refinement), samples);
+    if (surface.base.is_curved()) facet_heights_ = facet_heights(surface, tile_);
+    run_bytes_ =
+        glossy_run_bytes(btf_shape(surface, material, plan, samples.refinement), samples, surface.base);
 }
 
 double GlossyPixels::lobe_share_of_pair() const {
@@ -97,14 +114,24 @@ void GlossyPixels::add_run() {
         run.graph = run_pairs(context_, settings, tile_, shifts, options_.n_threads, monitor_);
         rays_ += run.graph.rays;
         pairs_ += static_cast<double>(run.graph.size());
+        std::optional<TurnNodes> nodes;
+        if (surface_.base.is_curved()) nodes.emplace(surface_.base, turn_step(rms_turn(run.graph)));
+        std::vector<TurnedLights> turned;
+        for (size_t b = 0; nodes && b < light_blocks_.size(); ++b) {
+            turned.push_back(turned_lights(grid_, tile_, lights_of(b), *nodes, places, options_.allow_skips,
+                                           options_.n_threads, monitor_));
+            rays_ += turned.back().rays;
+        }
         GraphOptions series;
         series.max_order = plan_.max_order;
         for (const SlotMaterial& material : materials_) {
             auto& blocks = run.arriving.emplace_back();
             for (size_t b = 0; b < light_blocks_.size(); ++b) {
                 GraphOrders found;
-                blocks.push_back(arriving_light(run.graph, tile_, material,
-                                                {light_blocks_[b], &run.lit, b * light_block}, series,
+                const GraphSide lights = nodes
+                                             ? GraphSide{turned[b].directions, &turned[b].visible, 0, &*nodes}
+                                             : GraphSide{light_blocks_[b], &run.lit, b * lights_at_once_};
+                blocks.push_back(arriving_light(run.graph, tile_, material, lights, series,
                                                 options_.n_threads, monitor_, found));
                 orders_ = std::max(orders_, found.n_orders);
                 remainder_ = std::max(remainder_, found.remainder);
@@ -114,33 +141,47 @@ void GlossyPixels::add_run() {
     runs_.push_back(std::move(run));
 }
 
+std::vector<Vec3> GlossyPixels::lights_of(size_t block) const {
+    const size_t first = block * lights_at_once_;
+    return {lights_.begin() + static_cast<long>(first),
+            lights_.begin() + static_cast<long>(std::min(lights_.size(), first + lights_at_once_))};
+}
+
+// The frame of the pixel, in which views are told, is not that of the facet that it shows.
+Vec3 GlossyPixels::view_of(int view, size_t slot) const {
+    const Vec3 d = to_vector(plan_.outgoing[view]);
+    return surface_.base.is_curved() ? view_at_height(d, surface_.base, plane_height_, facet_heights_[slot])
+                                     : d;
+}
+
 double GlossyPixels::indirect_irradiance(size_t unknown, size_t channel, size_t light) const {
     const Run& run = runs_.back();
     if (run.arriving.empty()) return 0;
-    const size_t slot = unknown % tile_.n_slots(), block = light / light_block,
+    const size_t slot = unknown % tile_.n_slots(), block = light / lights_at_once_,
                  padded = light_blocks_[block].padded();
     double sum = 0;
     for (uint32_t e = run.graph.out[unknown]; e < run.graph.out[unknown + 1]; ++e) {
-        const uint32_t d = run.graph.direction[e];
-        const float cosine = tile_.normal_x[slot] * run.graph.directions.x[d] +
-                             tile_.normal_y[slot] * run.graph.directions.y[d] +
-                             tile_.normal_z[slot] * run.graph.directions.z[d];
-        sum += std::max(0.0f, cosine) * run.arriving[channel][block][e * padded + light % light_block];
+        const PairDirection d = run.graph.leaving(e);
+        const float cosine =
+            tile_.normal_x[slot] * d.x + tile_.normal_y[slot] * d.y + tile_.normal_z[slot] * d.z;
+        sum += run.graph.solid_angle_of(e) * std::max(0.0f, cosine) *
+               run.arriving[channel][block][e * padded + light % lights_at_once_];
     }
-    return sum * run.graph.solid_angle;
+    return sum;
 }
 
 void GlossyPixels::add_pair_weights(const Run& run, int channel, const Vec3& view, const uint32_t* unknowns,
                                     size_t n, std::vector<float>& weights) const {
     std::vector<uint32_t> slot;
-    std::vector<float> x, y, z;
+    std::vector<float> x, y, z, solid_angle;
     for (size_t k = 0; k < n; ++k)
         for (uint32_t e = run.graph.out[unknowns[k]]; e < run.graph.out[unknowns[k] + 1]; ++e) {
-            const uint32_t d = run.graph.direction[e];
+            const PairDirection d = run.graph.leaving(e);
             slot.push_back(static_cast<uint32_t>(unknowns[k] % tile_.n_slots()));
-            x.push_back(run.graph.directions.x[d]);
-            y.push_back(run.graph.directions.y[d]);
-            z.push_back(run.graph.directions.z[d]);
+            x.push_back(d.x);
+            y.push_back(d.y);
+            z.push_back(d.z);
+            solid_angle.push_back(run.graph.solid_angle_of(e));
         }
     const DirectionArrays to(std::vector<Vec3>{view});
     std::vector<float> f(slot.size() * to.padded());
@@ -149,8 +190,7 @@ void GlossyPixels::add_pair_weights(const Run& run, int channel, const Vec3& vie
     for (size_t k = 0; k < slot.size(); ++k) {
         const float cosine =
             tile_.normal_x[slot[k]] * x[k] + tile_.normal_y[slot[k]] * y[k] + tile_.normal_z[slot[k]] * z[k];
-        weights.push_back(f[k * to.padded()] * static_cast<float>(run.graph.solid_angle) *
-                          std::max(0.0f, cosine));
+        weights.push_back(f[k * to.padded()] * solid_angle[k] * std::max(0.0f, cosine));
     }
 }
 
@@ -167,13 +207,13 @@ std::vector<float> GlossyPixels::values(const BtfShape& shape, const std::vector
             slots[p] = static_cast<uint32_t>(unknowns[p] % tile_.n_slots());
             const Vec3 d = plan_.cameras
                                ? pixel_to_camera(surface_, plane_height_, cameras_[view], shape, first + p)
-                               : to_vector(plan_.outgoing[view]);
+                               : view_of(view, slots[p]);
             x[p] = static_cast<float>(d.x), y[p] = static_cast<float>(d.y), z[p] = static_cast<float>(d.z);
         }
         std::vector<std::vector<float>> pair_weights(runs_.size());
         for (size_t r = 0; r < runs_.size() && !runs_[r].arriving.empty(); ++r) {
-            // Pixels of one direction together: all of a view, each of a camera's.
-            const size_t together = plan_.cameras ? 1 : count;
+            // Pixels of one direction together: all of a view, but for cameras and curved bases.
+            const size_t together = plan_.cameras || surface_.base.is_curved() ? 1 : count;
             for (size_t p = 0; p < count; p += together)
                 add_pair_weights(runs_[r], channel, {x[p], y[p], z[p]}, &unknowns[p], together,
                                  pair_weights[r]);
@@ -188,8 +228,8 @@ std::vector<float> GlossyPixels::values(const BtfShape& shape, const std::vector
                 const Run& run = runs_[r];
                 const float* weight = pair_weights[r].data();
                 for (size_t p = 0; p < count; ++p) {
-                    const float* lit = run.lit.of(unknowns[p]) + b * light_block;
-                    float* to = &values[(r * count + p) * n_lights + b * light_block];
+                    const float* lit = run.lit.of(unknowns[p]) + b * lights_at_once_;
+                    float* to = &values[(r * count + p) * n_lights + b * lights_at_once_];
                     for (int l = 0; l < lights.n; ++l) to[l] += f[p * padded + l] * lit[l];
                     if (run.arriving.empty()) continue;
                     const uint32_t begin = run.graph.out[unknowns[p]],

@@ -8,7 +8,7 @@
 namespace gonio {
 
 // What one run keeps, and needs beside while it is made.
-double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples);
+double glossy_run_bytes(const BtfShape& shape, const Accuracy::Samples& samples, const BaseCurvature& base);
 
 class GlossyPixels {
   public:
@@ -44,6 +44,9 @@ class GlossyPixels {
         PairGraph graph;
         std::vector<std::vector<HugeFloats>> arriving;  // [channel][block of lights]
     };
+    std::vector<Vec3> lights_of(size_t block) const;
+    // Towards the viewer, in the frame of the facet on a slot.
+    Vec3 view_of(int view, size_t slot) const;
     // Factor of the light that arrives over each pair of the facets, in their order, on its way to a view.
     void add_pair_weights(const Run& run, int channel, const Vec3& view, const uint32_t* unknowns, size_t n,
                           std::vector<float>& weights) const;
@@ -59,9 +62,11 @@ class GlossyPixels {
     Material material_;
     std::vector<SlotMaterial> materials_;  // one a channel
     std::vector<Vec3> lights_;
-    std::vector<DirectionArrays> light_blocks_;
+    size_t lights_at_once_ = 64;
+    std::vector<DirectionArrays> light_blocks_;  // of so many lights
     std::vector<Vec3> cameras_;
     double plane_height_ = 0;
+    std::vector<float> facet_heights_;  // per slot, on a curved base
     double run_bytes_ = 0;
     int started_runs_ = 0;
     std::vector<Run> runs_;

@@ -271,13 +271,19 @@ RayBundle make_bundle(const MarchGrid& grid, const Vec3& direction, const FacetP
             travel = std::min(travel, plane.nx / std::max(std::abs(dx), 1e-6) + 2);
     }
     std::vector<RawCrossing> list = list_crossings(bundle.path, travel);
-    if (bend)  // a steep ray leaves long before it is as steep as the base
-        std::erase_if(list, [&](const RawCrossing& c) { return !(bend->scale(c.travel) > 0); });
+    if (bend) {
+        // A steep ray leaves long before it is as steep as the base. One that falls into a hollow has hit by
+        // then, which the first such crossing tells (its rise is -1 / |kappa|).
+        auto end = std::find_if(list.begin(), list.end(),
+                                [&](const RawCrossing& c) { return !(bend->scale(c.travel) > 0); });
+        if (bend->kappa < 0 && end != list.end()) ++end;
+        list.erase(end, list.end());
+    }
 
     bundle.crossings.reserve(list.size());
     bundle.facets.reserve(list.size());
     for (const RawCrossing& c : list) {
-        const double scale = bend ? bend->scale(c.travel) : 1.0;
+        const double scale = bend ? std::max(0.0, bend->scale(c.travel)) : 1.0;
         bundle.crossings.push_back(
             {static_cast<float>(scale * (1 - c.weight)), static_cast<float>(scale * c.weight),
              static_cast<float>(bend ? bend->rise(c.travel) : rise * c.travel), wrap_index(c.x0, plane.nx),

@@ -61,6 +61,18 @@ Vec3 turned_direction(const Vec3& direction, const BaseCurvature& base, double x
     return turned_direction(direction, turn, turn_x / turn, turn_y / turn);
 }
 
+Vec3 view_at_height(const Vec3& view, const BaseCurvature& base, double from, double at) {
+    const double horizontal = std::hypot(view.x, view.y);
+    if (horizontal == 0) return view;
+    // (R + from + s view.z)^2 + (s horizontal)^2 = (R + at)^2, times the curvature; of its roots the upper
+    // one.
+    const double kappa = base.along(view.x, view.y), b = view.z * (1 + kappa * from),
+                 q = (from - at) * (2 + kappa * (from + at)), s = -q / (b + safe_sqrt(b * b - kappa * q)),
+                 out = s * horizontal, turn = std::atan2(kappa * out, 1 + kappa * (from + s * view.z)),
+                 distance = kappa == 0 ? out : turn / kappa;
+    return turned_direction(view, base, distance * view.x / horizontal, distance * view.y / horizontal);
+}
+
 void check_base(const HeightField& surface) {
     if (!surface.base.is_curved()) return;
     const auto [low, high] = std::minmax_element(surface.heights.begin(), surface.heights.end());

@@ -41,6 +41,12 @@ Vec3 turned_direction(const Vec3& direction, const BaseCurvature& base, double x
 // vector.
 Vec3 turned_direction(const Vec3& direction, double turn, double axis_x, double axis_y);
 
+// A straight ray towards `view`, z > 0, told in the frame of the base point over which it passes at height
+// `from`: what it is in the frame of the point over which it passes at height `at`, where it is met from
+// above. Exact for spheres and along principal directions; near the horizon of a convex base, where it does
+// not come down to that height, told where it is nearest.
+Vec3 view_at_height(const Vec3& view, const BaseCurvature& base, double from, double at);
+
 // Throws Error("/base/kappa_1" or "_2") where the relief does not fit on its base: parallel surfaces at its
 // heights would nearly fold or more than double (|kappa h| above 1/2), or a cell spans more than a quarter of
 // a radian.

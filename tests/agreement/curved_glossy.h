@@ -25,6 +25,11 @@ class FacetsInSpace {
         *wi = (drawn->wi.x * t) + (drawn->wi.y * b) + (drawn->wi.z * normal);
         return true;
     }
+    static Vec3 cosine_weighted(const Vec3& normal, const std::array<double, 4>& random) {
+        const double r = std::sqrt(random[0]), phi = 2 * pi * random[1];
+        const auto [t, b] = axes(normal);
+        return (r * std::cos(phi) * t) + (r * std::sin(phi) * b) + (safe_sqrt(1 - r * r) * normal);
+    }
 
   private:
     static const HeightField& plane() {
@@ -47,11 +52,13 @@ class FacetsInSpace {
     FacetBrdf brdf_;
 };
 
-// f of single orders, as means over the core of one patch (or over them all, of equal shares); one view,
-// every light.
+// f of single orders; one view, every light; paths start at random points of the cores of patches that are
+// equal shares of the surface. Without a view: irradiance of the facets, over that of the base, as the mean
+// over them, all of equal weight.
 inline std::vector<TracedOrders> trace_glossy(const std::vector<CurvedPatch*>& patches,
                                               const Material& material, const std::vector<Vec3>& lights,
-                                              const Vec3& view, int n_orders, int paths, uint64_t seed) {
+                                              const std::optional<Vec3>& view, int n_orders, int paths,
+                                              uint64_t seed) {
     const FacetsInSpace facets(material);
     const size_t n_lights = lights.size();
     std::vector<std::vector<double>> sum(n_lights, std::vector<double>(n_orders)), squares = sum;
@@ -65,24 +72,34 @@ inline std::vector<TracedOrders> trace_glossy(const std::vector<CurvedPatch*>& p
     for (int path = 0; path < paths; ++path) {
         const CurvedPatch& patch = *patches[path % patches.size()];
         CurvedPatch::Point p = patch.point_of(random(path, 0)), hit;
-        Vec3 wo = p.in_space(view, patch.base());
-        double throughput = p.area * dot(p.normal, wo) / view.z;
-        if (!(throughput > 0) || patch.trace(p.position, wo, &hit)) continue;
+        Vec3 wo;
+        double throughput = 1;
+        if (view) {
+            wo = p.in_space(*view, patch.base());
+            throughput = p.area * dot(p.normal, wo) / view->z;
+            if (!(throughput > 0) || patch.trace(p.position, wo, &hit)) continue;
+        }
         std::vector<Vec3> wi;
         for (const Vec3& light : lights) wi.push_back(p.in_space(light, patch.base()));
         for (int order = 0; order < n_orders; ++order) {
             for (size_t l = 0; l < n_lights; ++l) {
                 const double cosine = dot(p.normal, wi[l]);
                 if (!(cosine > 0) || patch.trace(p.position, wi[l], &hit)) continue;
-                const double f = throughput * facets.f(p.normal, wi[l], wo) * cosine / lights[l].z;
+                const double own = view || order > 0 ? facets.f(p.normal, wi[l], wo) : 1,
+                             f = throughput * own * cosine / lights[l].z;
                 sum[l][order] += f;
                 squares[l][order] += f * f;
             }
             Vec3 d;
             double weight;
-            if (!facets.sample(p.normal, wo, random(path, order + 1), &d, &weight) ||
-                !patch.trace(p.position, d, &hit))
-                break;
+            const auto numbers = random(path, order + 1);
+            if (view || order > 0) {
+                if (!facets.sample(p.normal, wo, numbers, &d, &weight)) break;
+            } else {
+                d = FacetsInSpace::cosine_weighted(p.normal, numbers);
+                weight = pi;
+            }
+            if (!patch.trace(p.position, d, &hit)) break;
             p = hit;
             wo = -1 * d;
             throughput *= weight;

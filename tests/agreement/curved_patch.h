@@ -107,16 +107,23 @@ class CurvedPatch {
         return point(cell % core_, cell / core_, kind, u, v);
     }
 
-    // What is seen at (x, y), in cells of the core, of the base from far away: a ray towards `view`, told in
-    // the frame there, that passes that place of the plane z = 0 of the surface as given. Not in a hollow.
+    // What is seen at (x, y), in cells of the core, of the base from above the relief: a ray towards `view`,
+    // told in the frame there, that passes that place of the plane z = 0 of the surface as given.
     bool see(double x, double y, const Vec3& view, Point* hit) const {
         const double base_x = (x - 0.5 * core_) * s_.pitch_x, base_y = (y - 0.5 * core_) * s_.pitch_y;
         const Vec3 w = turned_direction(view, s_.base, -base_x, -base_y);
-        const Vec3 from = displaced(base_x, base_y, -s_.mean_height) + (2 * top_ / view.z) * w;
-        return trace(from, -1 * w, hit);
+        // Up to where the ray leaves the layer, in which it stands at height h after s if
+        // (R + h)^2 = (R + start + s view.z)^2 + (s across)^2, across what is curved.
+        const double c = std::cos(s_.base.direction), n = std::sin(s_.base.direction),
+                     start = -s_.mean_height, kappa = s_.base.kappa_1,
+                     across = s_.base.kappa_2 == 0 ? c * view.x + n * view.y : std::hypot(view.x, view.y),
+                     a = kappa * (across * across + view.z * view.z), b = view.z * (1 + kappa * start),
+                     q = (start - top_) * (2 + kappa * (start + top_));
+        const double climb = -q / (b + std::sqrt(b * b - a * q));
+        return trace(displaced(base_x, base_y, start) + (0.999999 * climb) * w, -1 * w, hit);
     }
 
-    // The first facet from `origin` along `direction`, or nothing. Its position and normal only.
+    // The first facet from `origin` along `direction`, or nothing. (x, y): of the middle of the facet.
     bool trace(const Vec3& origin, const Vec3& direction, Point* hit) const {
         RTCRayHit ray{};
         ray.ray.org_x = static_cast<float>(origin.x);
@@ -137,6 +144,9 @@ class CurvedPatch {
         *hit = on_facet(static_cast<int>(ray.hit.primID));
         hit->position = origin + (static_cast<double>(ray.ray.tfar) * direction);
         const int cell = static_cast<int>(ray.hit.primID) / 2;
+        const double third = ray.hit.primID % 2 == 0 ? 2.0 / 3 : 1.0 / 3;
+        hit->x = base_x(cell % n_) + third * s_.pitch_x;
+        hit->y = base_y(cell / n_) + (1 - third) * s_.pitch_y;
         hit->facet = facet_index(s_.nx, s_.ny, 0, static_cast<int>(ray.hit.primID) % 2,
                                  wrap_index(y0_ + cell / n_, s_.ny), wrap_index(x0_ + cell % n_, s_.nx));
         return true;
