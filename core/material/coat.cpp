@@ -13,7 +13,8 @@ namespace {
 
 // Nodes: eta by s = (eta - 1) / (eta + 1), whose square is F at normal incidence; alpha evenly; cos_theta by
 // its root, for it is at grazing that F changes fast.
-constexpr int n_eta = 33, n_alpha = 17, n_cos = 65, quadrature = 12;
+constexpr int n_eta = CoatTable::n_eta, n_alpha = CoatTable::n_alpha, n_cos = CoatTable::n_cos,
+              quadrature = 12;
 
 // A place between nodes `first` and `first + 1`.
 struct Place {
@@ -100,6 +101,11 @@ double coat_transmittance(double eta, double alpha, double cos_theta) {
             return between(c, [&](int m) { return row[m]; });
         });
     });
+}
+
+CoatTable coat_table() {
+    static const std::vector<float> nodes(table().transmittance.begin(), table().transmittance.end());
+    return {nodes.data()};
 }
 
 double mean_coat_transmittance(double eta, double alpha) {

@@ -63,12 +63,13 @@ Vec3 visible_normal_beckmann(const Vec3& wo, double u1, double u2) {
 
 double MicrofacetDistribution::density(const Vec3& h) const {
     if (h.z <= 0) return 0;
-    const double x = h.x / alpha_x, y = h.y / alpha_y, z_2 = h.z * h.z;
-    const double area = pi * alpha_x * alpha_y;
+    const double area = alpha_x * alpha_y, x = h.x * alpha_y, y = h.y * alpha_x, z_2 = h.z * h.z;
     if (kind == Microfacet::Distribution::beckmann)
-        return std::exp(-(x * x + y * y) / z_2) / (area * z_2 * z_2);
-    const double q = x * x + y * y + z_2;
-    return 1 / (area * q * q);
+        return std::exp(-(x * x + y * y) / (area * area * z_2)) / (pi * area * z_2 * z_2);
+    // With both sides of q = tan^2 / alpha^2 z^2 + z^2 times area^2, one division does: the path tracer
+    // spends its time here.
+    const double q = x * x + y * y + area * area * z_2;
+    return area * area * area / (pi * q * q);
 }
 
 double MicrofacetDistribution::lambda(const Vec3& w) const {

@@ -76,12 +76,12 @@ std::vector<AnglesDeg> view_angles(const HeightField& s, const BtfPlan& plan) {
 
 std::vector<Vec3> camera_places(const HeightField& s, const BtfPlan& plan) {
     const CameraPlane& cameras = *plan.cameras;
+    const double height = view_plane_height(s, plan) + cameras.height;
     std::vector<Vec3> places;
     for (int v = 0; v < cameras.n_v; ++v)
         for (int u = 0; u < cameras.n_u; ++u)
             places.push_back({0.5 * s.width() + ((u + 0.5) / cameras.n_u - 0.5) * cameras.width,
-                              0.5 * s.depth() + ((v + 0.5) / cameras.n_v - 0.5) * cameras.depth,
-                              view_plane_height(s, plan) + cameras.height});
+                              0.5 * s.depth() + ((v + 0.5) / cameras.n_v - 0.5) * cameras.depth, height});
     return places;
 }
 

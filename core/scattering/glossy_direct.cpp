@@ -35,6 +35,7 @@ void add_direct(const SlotMaterial& material, const Tile& tile, const DirectionA
             slots.first = first;
             slots.count = std::min(direct_chunk, tile.n_slots() - first);
             slots.area = area.data();
+            slots.n_sub_samples = light_bits.n_sub_samples;
             slots.light_bits = light_bits.of(0) + part * tile.n_slots() + first;
             slots.light_stride = light_bits.n_unknowns;
             slots.view_bits = (same ? light_bits : view_bits).of(0) + part * tile.n_slots() + first;

@@ -26,8 +26,6 @@ size_t fill_factors(const SlotLobe* lobe, const Tile& tile, const DirectSlots& s
     factors.resize(directions.n * size);
     for (size_t k = 0; k < slots.count; k += lanes) {
         const size_t at = slots.first + k;
-        size_t own_slots[16];
-        for (size_t lane = 0; lane < 16; ++lane) own_slots[lane] = at + std::min(lane, lanes - 1);
         LobeNumbers numbers;
         if (lobe)
             numbers = load_numbers<shape, aniso, false>(
@@ -43,8 +41,7 @@ size_t fill_factors(const SlotLobe* lobe, const Tile& tile, const DirectSlots& s
                 hn::StoreU(hn::Max(z, hn::Zero(d)), d, to);
                 continue;
             }
-            Factors f = factors_of<shape, aniso>(numbers, z, dx, dy, dz);
-            if constexpr (shape == Shape::coat_base) f.s = coat_factors(*lobe, own_slots, f.z);
+            const Factors f = factors_of<shape, aniso>(numbers, z, dx, dy, dz);
             hn::StoreU(f.z, d, to);
             hn::StoreU(f.s, d, to + direct_chunk);
             if constexpr (aniso) {
@@ -58,6 +55,12 @@ size_t fill_factors(const SlotLobe* lobe, const Tile& tile, const DirectSlots& s
 
 // Views that are worked on side by side: they share what is loaded of light and facet.
 constexpr int abreast = 4;
+
+// How many of the sub-samples' bits are set: of a single one, the bit itself.
+HWY_INLINE VF bit_count(hn::Vec<DU> bits, bool single) {
+    const auto count = single ? bits : hn::PopulationCount(bits);
+    return hn::ConvertTo(D(), hn::BitCast(DI(), count));
+}
 
 // lambert: null if another lobe carries it.
 template <Shape shape, bool aniso, bool fresnel>
@@ -73,6 +76,7 @@ void direct_of_lobe(const SlotLobe* lobe, const float* lambert, const Tile& tile
     const float* view_factors = same ? light_factors : scratch.view_factors.data();
     const uint32_t* light_bits = scratch.light_bits.data();
     const uint32_t* view_bits = same ? light_bits : scratch.view_bits.data();
+    const bool single_bit = slots.n_sub_samples == 1;
     auto factors_at = [&](const float* of, size_t k, VF z) {
         Factors f;
         f.z = z;
@@ -111,8 +115,7 @@ void direct_of_lobe(const SlotLobe* lobe, const float* lambert, const Tile& tile
                     a = factors_at(fl, k, za);
                 }
                 for (int q = 0; q < abreast; ++q) {
-                    const auto both = hn::PopulationCount(hn::And(lit, hn::LoadU(du, bv[q] + k)));
-                    const VF count = hn::ConvertTo(d, hn::BitCast(hn::RebindToSigned<D>(), both)),
+                    const VF count = bit_count(hn::And(lit, hn::LoadU(du, bv[q] + k)), single_bit),
                              zb = hn::LoadU(d, fv[q] + k);
                     VF f = diffuse;
                     if (lobe)

@@ -37,6 +37,7 @@ inline constexpr size_t direct_chunk = 128;
 struct DirectSlots {
     size_t first = 0, count = 0;  // slots; multiples of 32
     const float* area = nullptr;  // per slot of the tile; 0 where it is not measured
+    int n_sub_samples = 32;
     // bits[direction * stride + slot - first]: one bit a sub-sample.
     const uint32_t *light_bits = nullptr, *view_bits = nullptr;
     size_t light_stride = 0, view_stride = 0;

@@ -22,20 +22,16 @@ void rows_of_lobe(const SlotLobe& lobe, const Tile& tile, size_t n_rows, const u
     const size_t lanes = hn::Lanes(d), padded = directions.x.size();
     for (size_t r = 0; r < n_rows; ++r, out += padded) {
         const size_t at = slot[r];
-        size_t same_slots[16];
-        std::fill_n(same_slots, 16, at);
         const LobeNumbers numbers = load_numbers<shape, aniso, fresnel>(
             lobe, [&](const std::vector<float>& values) { return hn::Set(d, values[at]); });
         const VF nx = hn::Set(d, tile.normal_x[at]), ny = hn::Set(d, tile.normal_y[at]),
                  nz = hn::Set(d, tile.normal_z[at]);
         const VF x = hn::Set(d, wx[r]), y = hn::Set(d, wy[r]), z = hn::Set(d, wz[r]);
-        Factors own = factors_of<shape, aniso>(numbers, dot(nx, ny, nz, x, y, z), x, y, z);
-        if constexpr (shape == Shape::coat_base) own.s = coat_factors(lobe, same_slots, own.z);
+        const Factors own = factors_of<shape, aniso>(numbers, dot(nx, ny, nz, x, y, z), x, y, z);
         for (size_t c = 0; c < padded; c += lanes) {
             const VF dx = hn::LoadU(d, &directions.x[c]), dy = hn::LoadU(d, &directions.y[c]),
                      dz = hn::LoadU(d, &directions.z[c]);
-            Factors other = factors_of<shape, aniso>(numbers, dot(nx, ny, nz, dx, dy, dz), dx, dy, dz);
-            if constexpr (shape == Shape::coat_base) other.s = coat_factors(lobe, same_slots, other.z);
+            const Factors other = factors_of<shape, aniso>(numbers, dot(nx, ny, nz, dx, dy, dz), dx, dy, dz);
             // From |a + b|: 1 + <a, b> would cancel where they are nearly opposite.
             const VF sx = hn::Add(x, dx), sy = hn::Add(y, dy), sz = hn::Add(z, dz),
                      length2 = hn::Max(dot(sx, sy, sz, sx, sy, sz), hn::Set(d, 1e-12f));

@@ -20,7 +20,9 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 using D = hn::CappedTag<float, 16>;
 using DU = hn::RebindToUnsigned<D>;
+using DI = hn::RebindToSigned<D>;
 using VF = hn::Vec<D>;
+using VI = hn::Vec<DI>;
 using Shape = SlotLobe::Shape;
 
 constexpr float least_cosine = 1e-9f;
@@ -61,7 +63,60 @@ struct Factors {
 struct LobeNumbers {
     VF weight, alpha2, sharpness, eta, k, alpha_x4, alpha_y4;
     VF tx, ty, tz, bx, by, bz;
+    VI coat_nodes;              // the first of the coat table's for this index and alpha,
+    VF eta_share, alpha_share;  // and how much the next ones count
+    const float* transmittance;
 };
+
+// t, cut to [0, n], as the node below it (n - 1 at most) and the share of the one above.
+HWY_INLINE VI node_below(VF t, int n, VF& share) {
+    const D d;
+    const DI di;
+    const VF inside = hn::Clamp(t, hn::Zero(d), hn::Set(d, static_cast<float>(n)));
+    const VI node = hn::Min(hn::ConvertTo(di, inside), hn::Set(di, n - 1));
+    share = hn::Sub(inside, hn::ConvertTo(d, node));
+    return node;
+}
+
+// Where the table of coats (material/coat.h) is looked up for what does not depend on directions.
+HWY_INLINE void place_coat(VF eta, VF alpha, LobeNumbers& n) {
+    const D d;
+    const DI di;
+    constexpr int last_eta = CoatTable::n_eta - 1, last_alpha = CoatTable::n_alpha - 1;
+    // From the end of infinite index: next to it 1 - (eta - 1) / (eta + 1) would cancel.
+    VF from_end;
+    const VI before_last =
+        node_below(hn::Div(hn::Set(d, 2.0f * last_eta), hn::Add(eta, hn::Set(d, 1.0f))), last_eta, from_end);
+    const VI eta_node = hn::Sub(hn::Set(di, last_eta - 1), before_last);
+    n.eta_share = hn::Sub(hn::Set(d, 1.0f), from_end);
+    const VI alpha_node =
+        node_below(hn::Mul(alpha, hn::Set(d, static_cast<float>(last_alpha))), last_alpha, n.alpha_share);
+    n.coat_nodes = hn::Mul(hn::Add(hn::Mul(eta_node, hn::Set(di, CoatTable::n_alpha)), alpha_node),
+                           hn::Set(di, CoatTable::n_cos));
+    n.transmittance = coat_table().transmittance;
+}
+
+// What passes the coat.
+HWY_INLINE VF coat_passes(const LobeNumbers& n, VF z) {
+    const D d;
+    constexpr int last = CoatTable::n_cos - 1;
+    VF unused;
+    const VI node = node_below(hn::Mul(hn::Sqrt(z), hn::Set(d, static_cast<float>(last))), last, unused);
+    const VF low = hn::ConvertTo(d, node);  // nodes stand at the squares
+    const VF share =
+        hn::Clamp(hn::Div(hn::MulSub(z, hn::Set(d, static_cast<float>(last * last)), square(low)),
+                          hn::MulAdd(low, hn::Set(d, 2.0f), hn::Set(d, 1.0f))),
+                  hn::Zero(d), hn::Set(d, 1.0f));
+    const VI at = hn::Add(n.coat_nodes, node);
+    const auto between = [](VF a, VF b, VF t) HWY_ATTR { return hn::MulAdd(t, hn::Sub(b, a), a); };
+    const auto of_row = [&](int row) HWY_ATTR {
+        const float* nodes = n.transmittance + row * CoatTable::n_cos;
+        return between(hn::GatherIndex(d, nodes, at), hn::GatherIndex(d, nodes + 1, at), share);
+    };
+    return between(between(of_row(0), of_row(1), n.alpha_share),
+                   between(of_row(CoatTable::n_alpha), of_row(CoatTable::n_alpha + 1), n.alpha_share),
+                   n.eta_share);
+}
 
 template <Shape shape, bool aniso, bool fresnel, class Load>
 HWY_INLINE LobeNumbers load_numbers(const SlotLobe& lobe, Load&& load) {
@@ -77,7 +132,9 @@ HWY_INLINE LobeNumbers load_numbers(const SlotLobe& lobe, Load&& load) {
             n.sharpness = load(lobe.sharpness);
         }
         if constexpr (fresnel) n.eta = load(lobe.eta), n.k = load(lobe.k);
-    } else if constexpr (shape != Shape::coat_base) {
+    } else if constexpr (shape == Shape::coat_base) {
+        place_coat(load(lobe.coat_eta), load(lobe.coat_alpha), n);
+    } else {
         n.sharpness = load(lobe.sharpness);
     }
     return n;
@@ -109,6 +166,8 @@ HWY_INLINE Factors factors_of(const LobeNumbers& n, VF z, VF dx, VF dy, VF dz) {
             const VF lambda2 = hn::Mul(hn::Exp(d, hn::Neg(square(a))), hn::Max(scaled, hn::Zero(d)));
             f.s = hn::MulAdd(f.z, lambda2, f.z);
         }
+    } else if constexpr (shape == Shape::coat_base) {
+        f.s = coat_passes(n, f.z);
     }
     return f;
 }
@@ -179,18 +238,6 @@ HWY_INLINE VF lobe_value(const LobeNumbers& n, const Factors& a, const Factors& 
             return value;
         }
     }
-}
-
-// What passes the coat, from the table of the material: not one of the fast shapes.
-HWY_INLINE VF coat_factors(const SlotLobe& lobe, const size_t* slots, VF z) {
-    const D d;
-    const size_t lanes = hn::Lanes(d);
-    HWY_ALIGN float values[16];
-    hn::Store(z, d, values);
-    for (size_t k = 0; k < lanes; ++k)
-        values[k] = static_cast<float>(
-            coat_transmittance(lobe.coat_eta[slots[k]], lobe.coat_alpha[slots[k]], values[k]));
-    return hn::Load(d, values);
 }
 
 // Calls visit.template operator()<shape, aniso, fresnel>().

@@ -25,6 +25,7 @@ VisibilityBits find_visibility(const MarchGrid& grid, const Tile& tile, const st
                                const Monitor& monitor) {
     VisibilityBits result;
     result.n_unknowns = tile.n_unknowns();
+    result.n_sub_samples = static_cast<int>(sub_samples.size());
     result.bits.resize(directions.size() * result.n_unknowns);
     const size_t half = tile.n_slots() / 2;
     const uint32_t all = sub_samples.size() == most_bits ? ~0u : (1u << sub_samples.size()) - 1;

@@ -17,6 +17,7 @@ inline constexpr int most_bits = 32;  // sub-samples that fit one word
 struct VisibilityBits {
     std::vector<uint32_t, HugePageAllocator<uint32_t>> bits;
     size_t n_unknowns = 0;
+    int n_sub_samples = most_bits;  // bits in use
     double rays = 0, rays_skipped = 0;
     int truncated_bundles = 0;
 

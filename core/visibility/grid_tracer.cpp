@@ -86,7 +86,12 @@ HWY_INLINE void walk(const TraceGrid& grid, RayBatch& rays, size_t at, size_t co
     const VF per_cell = hn::Div(one, hn::Max(hn::Abs(dx), hn::Abs(dy)));
     const VF near = hn::Mul(per_cell, hn::Set(d, static_cast<float>(jump_cells[0]))),
              far = hn::Mul(per_cell, hn::Set(d, static_cast<float>(jump_cells[1])));
-    const VF falls_near = hn::Min(zero, hn::Mul(dz, near)), falls_far = hn::Min(zero, hn::Mul(dz, far));
+    // A ray that falls may jump as far as it stays above what is highest around it; less than two cells are
+    // not worth it.
+    const VF shortest = hn::Add(per_cell, per_cell), falls_shortest = hn::Min(zero, hn::Mul(dz, shortest)),
+             per_fall = hn::Div(hn::Set(d, -1.0f), hn::Min(dz, hn::Set(d, -1e-20f)));
+    const auto until = [&](VF height, VF limit)
+                           HWY_ATTR { return hn::Min(limit, hn::Mul(hn::Sub(r.z, height), per_fall)); };
     const VF inverse_x = hn::Div(one, dx), inverse_y = hn::Div(one, dy),
              inverse_d = hn::Div(one, away_from_zero(hn::Sub(dx, dy)));
     const M right = hn::Gt(dx, zero), up = hn::Gt(dy, zero), rising = hn::Gt(dz, zero);
@@ -101,13 +106,11 @@ HWY_INLINE void walk(const TraceGrid& grid, RayBatch& rays, size_t at, size_t co
         const VI cell = hn::Add(hn::Mul(r.j, nx), r.i);
 
         const VF near_top = hn::GatherIndex(d, grid.highest_near[0].data(), cell);
-        const M jump = hn::And(active, hn::Gt(hn::Add(r.z, falls_near), near_top));
+        const M jump = hn::And(active, hn::Gt(hn::Add(r.z, falls_shortest), near_top));
         if (!hn::AllFalse(d, jump)) {
-            VF length = near;
-            if (far_at_once || step > 0) {
-                const VF far_top = hn::GatherIndex(d, grid.highest_near[1].data(), cell);
-                length = hn::IfThenElse(hn::Gt(hn::Add(r.z, falls_far), far_top), far, near);
-            }
+            VF length = until(near_top, near);
+            if (far_at_once || step > 0)
+                length = hn::Max(length, until(hn::GatherIndex(d, grid.highest_near[1].data(), cell), far));
             length = hn::IfThenElseZero(jump, length);
             r.z = hn::MulAdd(dz, length, r.z);
             const VF u = hn::MulAdd(dx, length, r.u), v = hn::MulAdd(dy, length, r.v);

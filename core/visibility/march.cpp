@@ -24,7 +24,14 @@ using VF = hn::Vec<D>;
 using VI = hn::Vec<DI>;
 using M = hn::Mask<D>;
 
-// Two vectors march together: enough for the latency of the fused multiply-adds, few enough to stop early.
+// Vectors that march together: enough for the latency of the fused multiply-adds and to share what is looked
+// up of a crossing, few enough to stop early and to stay in registers.
+#if HWY_TARGET <= HWY_AVX3
+constexpr int together = 2;
+#else
+constexpr int together = 4;
+#endif
+
 struct Block {
     const MarchPlane* plane;
     const RayBundle* bundle;
@@ -81,51 +88,62 @@ HWY_INLINE uint32_t mask_bits(M mask) {
     return bits;
 }
 
-// Marches 2 vectors of rays; returns front and hit lanes as bits and, where asked, the crossing behind each
-// hit. kBent: as bundle.bent.
+// Marches `together` vectors of rays; returns front and hit lanes as bits and, where asked, the crossing
+// behind each hit. kBent: as bundle.bent.
 template <bool kWantCrossing, bool kBent>
-HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_bits, int32_t* crossing) {
+HWY_INLINE void march_together(const Block& b, uint32_t& front_bits, uint32_t& hit_bits, int32_t* crossing) {
     const D d;
     const DI di;
     const int lanes = static_cast<int>(hn::Lanes(d));
     const MarchPlane& plane = *b.plane;
     const RayBundle& bundle = *b.bundle;
     const bool rising = bundle.direction.rise > 0;
-    VF height0, height1;
-    M active0, active1;
-    start_rays(b, 0, height0, active0);
-    start_rays(b, lanes, height1, active1);
-    const M front0 = active0, front1 = active1;
-    VI at0 = hn::Zero(di), at1 = hn::Zero(di);
+    VF height[together];
+    M front[together], active[together];
+    VI at[together];
+    for (int v = 0; v < together; ++v) {
+        start_rays(b, v * lanes, height[v], front[v]);
+        active[v] = front[v];
+        at[v] = hn::Zero(di);
+    }
     const VF top = hn::Set(d, b.highest);
-    auto none_below = [&](VF left) HWY_ATTR {
-        return hn::AllFalse(
-            d, hn::Or(hn::And(active0, hn::Gt(left, height0)), hn::And(active1, hn::Gt(left, height1))));
+    auto none = [&](auto&& of_vector) HWY_ATTR {
+        M any = of_vector(0);
+        for (int v = 1; v < together; ++v) any = hn::Or(any, of_vector(v));
+        return hn::AllFalse(d, any);
+    };
+    auto none_left = [&]() HWY_ATTR { return none([&](int v) HWY_ATTR { return active[v]; }); };
+    // Whether `limit` is above no ray.
+    auto none_below = [&](VF limit) HWY_ATTR {
+        return none([&](int v) HWY_ATTR { return hn::And(active[v], hn::Gt(limit, height[v])); });
     };
 
-    if (!hn::AllFalse(d, hn::Or(active0, active1))) {
+    if (!none_left()) {
         // Crossing 0 is the edge of the ray's own facet, which only a ray from above can hit.
         int k = bundle.from_above ? 0 : 1;
         for (const CrossingGroup& group : bundle.groups) {
             if (group.window >= 0) {
                 const float* w = node_at(plane, plane.window_max[group.window], b, group.column, group.row);
                 const VF rise = hn::Set(d, group.lowest_rise);
-                M need;
+                bool passes_over;
                 if constexpr (kBent) {
                     if (none_below(hn::Set(d, bundle.escape[k]))) break;
                     const VF scale = hn::Set(d, group.scale);
-                    need = hn::Or(
-                        hn::And(active0, hn::Gt(hn::MulSub(hn::LoadU(d, w), scale, rise), height0)),
-                        hn::And(active1, hn::Gt(hn::MulSub(hn::LoadU(d, w + lanes), scale, rise), height1)));
+                    passes_over = none([&](int v) HWY_ATTR {
+                        const VF edge = hn::MulSub(hn::LoadU(d, w + v * lanes), scale, rise);
+                        return hn::And(active[v], hn::Gt(edge, height[v]));
+                    });
                 } else {
-                    const VF ray0 = hn::Add(height0, rise), ray1 = hn::Add(height1, rise);
-                    if (rising && hn::AllFalse(d, hn::Or(hn::And(active0, hn::Gt(top, ray0)),
-                                                         hn::And(active1, hn::Gt(top, ray1)))))
+                    VF ray[together];
+                    for (int v = 0; v < together; ++v) ray[v] = hn::Add(height[v], rise);
+                    if (rising &&
+                        none([&](int v) HWY_ATTR { return hn::And(active[v], hn::Gt(top, ray[v])); }))
                         break;
-                    need = hn::Or(hn::And(active0, hn::Gt(hn::LoadU(d, w), ray0)),
-                                  hn::And(active1, hn::Gt(hn::LoadU(d, w + lanes), ray1)));
+                    passes_over = none([&](int v) HWY_ATTR {
+                        return hn::And(active[v], hn::Gt(hn::LoadU(d, w + v * lanes), ray[v]));
+                    });
                 }
-                if (hn::AllFalse(d, need)) {
+                if (passes_over) {
                     k = group.end;
                     continue;
                 }
@@ -136,23 +154,17 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
                 const float* p = node_at(plane, plane.heights, b, c.column, c.row);
                 const float* q = p + c.second_node;
                 const VF w0 = hn::Set(d, c.weight0), w1 = hn::Set(d, c.weight1), rise = hn::Set(d, c.rise);
-                VF edge0 = hn::MulAdd(hn::LoadU(d, q), w1, hn::MulSub(hn::LoadU(d, p), w0, rise));
-                VF edge1 =
-                    hn::MulAdd(hn::LoadU(d, q + lanes), w1, hn::MulSub(hn::LoadU(d, p + lanes), w0, rise));
-                if constexpr (kBent) {
-                    const VF escape = hn::Set(d, bundle.escape[k]);
-                    edge0 = hn::Min(edge0, escape);
-                    edge1 = hn::Min(edge1, escape);
+                for (int v = 0; v < together; ++v) {
+                    VF edge = hn::MulAdd(hn::LoadU(d, q + v * lanes), w1,
+                                         hn::MulSub(hn::LoadU(d, p + v * lanes), w0, rise));
+                    if constexpr (kBent) edge = hn::Min(edge, hn::Set(d, bundle.escape[k]));
+                    const M above = hn::Gt(edge, height[v]);
+                    if constexpr (kWantCrossing)
+                        at[v] = hn::IfThenElse(hn::RebindMask(di, hn::And(active[v], above)), hn::Set(di, k),
+                                               at[v]);
+                    active[v] = hn::AndNot(above, active[v]);
                 }
-                const M above0 = hn::Gt(edge0, height0), above1 = hn::Gt(edge1, height1);
-                if constexpr (kWantCrossing) {
-                    const VI index = hn::Set(di, k);
-                    at0 = hn::IfThenElse(hn::RebindMask(di, hn::And(active0, above0)), index, at0);
-                    at1 = hn::IfThenElse(hn::RebindMask(di, hn::And(active1, above1)), index, at1);
-                }
-                active0 = hn::AndNot(above0, active0);
-                active1 = hn::AndNot(above1, active1);
-                if (hn::AllFalse(d, hn::Or(active0, active1))) {
+                if (none_left()) {
                     done = true;
                     break;
                 }
@@ -165,20 +177,21 @@ HWY_INLINE void march_pair(const Block& b, uint32_t& front_bits, uint32_t& hit_b
             if (done) break;
         }
     }
-    front_bits = mask_bits(front0) | mask_bits(front1) << lanes;
-    hit_bits = front_bits & ~(mask_bits(active0) | mask_bits(active1) << lanes);
-    if constexpr (kWantCrossing) {
-        hn::StoreU(at0, di, crossing);
-        hn::StoreU(at1, di, crossing + lanes);
+    front_bits = hit_bits = 0;
+    for (int v = 0; v < together; ++v) {
+        const uint32_t starts = mask_bits(front[v]) << v * lanes;
+        front_bits |= starts;
+        hit_bits |= starts & ~(mask_bits(active[v]) << v * lanes);
+        if constexpr (kWantCrossing) hn::StoreU(at[v], di, crossing + v * lanes);
     }
 }
 
 template <bool kWantCrossing>
 HWY_INLINE void march_block_of(const Block& b, uint32_t& front, uint32_t& hit, int32_t* crossing) {
     if (b.bundle->bent)
-        march_pair<kWantCrossing, true>(b, front, hit, crossing);
+        march_together<kWantCrossing, true>(b, front, hit, crossing);
     else
-        march_pair<kWantCrossing, false>(b, front, hit, crossing);
+        march_together<kWantCrossing, false>(b, front, hit, crossing);
 }
 
 HWY_INLINE uint32_t tail_mask(int width, int word) {
@@ -188,7 +201,7 @@ HWY_INLINE uint32_t tail_mask(int width, int word) {
 
 void march_lines(const MarchPlane& plane, const RayBundle& bundle, float highest, int column, int row,
                  int width, int n_lines, uint32_t* front, uint32_t* hit, int32_t* crossing) {
-    const int step = 2 * static_cast<int>(hn::Lanes(D())), words = words_for(width);
+    const int step = together * static_cast<int>(hn::Lanes(D())), words = words_for(width);
     for (int line = 0; line < n_lines; ++line)
         for (int word = 0; word < words; ++word) {
             Block b{

@@ -163,19 +163,30 @@ ViewMap make_camera_map(const TraceGrid& grid, const HeightField& surface, const
                 facet_index(grid.nx, grid.ny, facet_part(hits.kind[k], hits.u[k], hits.v[k], refinement),
                             hits.kind[k], hits.j[k], hits.i[k]));
     };
+    // Along x and along y on their own: where the ray of a pixel passes the highest point, and its direction.
+    struct Entry {
+        Place place;
+        double ray;
+    };
+    const double down = pixels.plane_height - place.z, climb = (top - pixels.plane_height) / down;
+    const auto entries = [&](int n, int first, int length, double sample, double pitch, double camera,
+                             int period) {
+        std::vector<Entry> list;
+        for (int k = 0; k < n; ++k) {
+            const double pixel = (first + (k + sample) * length / n) * pitch, ray = pixel - camera;
+            list.push_back({Place((pixel + climb * ray) / pitch, period), ray});
+        }
+        return list;
+    };
+    const std::vector<Entry> x = entries(pixels.nx, pixels.area.x0, pixels.area.width, sample_x,
+                                         surface.pitch_x, place.x, grid.nx),
+                             y = entries(pixels.ny, pixels.area.y0, pixels.area.height, sample_y,
+                                         surface.pitch_y, place.y, grid.ny);
     for (int j = 0; j < pixels.ny; ++j)
         for (int i = 0; i < pixels.nx; ++i) {
-            const Vec3 pixel{
-                (pixels.area.x0 + (i + sample_x) * pixels.area.width / pixels.nx) * surface.pitch_x,
-                (pixels.area.y0 + (j + sample_y) * pixels.area.height / pixels.ny) * surface.pitch_y,
-                pixels.plane_height};
-            const Vec3 ray{pixel.x - place.x, pixel.y - place.y, pixel.z - place.z};
-            const double climb =
-                (top - pixel.z) / ray.z;  // from the pixel to the highest point, in lengths of `ray`
-            const Place x((pixel.x + climb * ray.x) / surface.pitch_x, grid.nx),
-                y((pixel.y + climb * ray.y) / surface.pitch_y, grid.ny);
-            rays.add(grid, x.cell, y.cell, static_cast<float>(x.inside), static_cast<float>(y.inside),
-                     grid.highest, ray, j * pixels.nx + i);
+            rays.add(grid, x[i].place.cell, y[j].place.cell, static_cast<float>(x[i].place.inside),
+                     static_cast<float>(y[j].place.inside), grid.highest, {x[i].ray, y[j].ray, down},
+                     j * pixels.nx + i);
             if (rays.n == together) trace();
         }
     trace();

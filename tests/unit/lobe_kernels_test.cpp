@@ -61,6 +61,8 @@ std::vector<NamedMaterial> materials(int nx, int ny) {
     add("phong", Phong{25.0, 0.6});
     add("phong of exponent 0", Phong{0.0, 0.6});
     add("coated", CoatedDiffuse{1.5, 0.2, 0.5});
+    add("coats", CoatedDiffuse{random_map(nx, ny, 1, 4), random_map(nx, ny, 0.02, 1), 0.5});
+    add("coat of index 1e4", CoatedDiffuse{1e4, 0.3, 0.5});
     Material mixture({"y"}, Lambertian{0.8});
     mixture.lobes.front().weight = 0.5;
     mixture.lobes.push_back({random_map(nx, ny, 0, 0.5), microfacet(ggx, 0.2, 0.2)});
