@@ -92,12 +92,16 @@ void direct_of_lobe(const SlotLobe* lobe, const float* lambert, const Tile& tile
         for (int first = same ? l : 0; first < views.n; first += abreast) {
             const float *fl = light_factors + l * size, *fv[abreast];
             const uint32_t *bl = light_bits + l * direct_chunk, *bv[abreast];
-            VF cos_ab[abreast], inverse[abreast], sum[abreast];
+            VF cos_ab[abreast], inverse[abreast], reflected[abreast], sum[abreast];
             for (int q = 0; q < abreast; ++q) {
                 const int v = std::min(first + q, views.n - 1);  // beyond the last: computed in vain
                 const size_t pair = static_cast<size_t>(l) * views.n + v;
                 cos_ab[q] = hn::Set(d, scratch.cos_ab[pair]);
                 inverse[q] = hn::Set(d, scratch.inverse[pair]);
+                reflected[q] = hn::Set(d, 1.0f);
+                if (lobe && lobe->same_index)
+                    reflected[q] = fresnel_factor(cos_2_to_half(cos_ab[q]), hn::Set(d, lobe->same_index->eta),
+                                                  hn::Set(d, lobe->same_index->k));
                 fv[q] = view_factors + v * size;
                 bv[q] = view_bits + v * direct_chunk;
                 sum[q] = hn::Zero(d);
@@ -119,8 +123,9 @@ void direct_of_lobe(const SlotLobe* lobe, const float* lambert, const Tile& tile
                              zb = hn::LoadU(d, fv[q] + k);
                     VF f = diffuse;
                     if (lobe)
-                        f = hn::Add(f, lobe_value<shape, aniso, fresnel>(numbers, a, factors_at(fv[q], k, zb),
-                                                                         cos_ab[q], inverse[q]));
+                        f = hn::MulAdd(lobe_value<shape, aniso, fresnel>(numbers, a, factors_at(fv[q], k, zb),
+                                                                         cos_ab[q], inverse[q]),
+                                       reflected[q], f);
                     sum[q] = hn::MulAdd(hn::Mul(hn::Mul(area, zb), count), f, sum[q]);
                 }
             }
@@ -145,7 +150,7 @@ void direct(const SlotMaterial& material, const Tile& tile, const DirectSlots& s
         direct_of_lobe<Shape::blinn_phong, false, false>(nullptr, lambert, tile, slots, lights, views, same,
                                                          scratch, sums);
     for (const SlotLobe& lobe : material.lobes) {
-        with_lobe(lobe, [&]<Shape shape, bool aniso, bool fresnel>() {
+        with_lobe(lobe, lobe.fresnel && !lobe.same_index, [&]<Shape shape, bool aniso, bool fresnel>() {
             direct_of_lobe<shape, aniso, fresnel>(&lobe, lambert, tile, slots, lights, views, same, scratch,
                                                   sums);
         });

@@ -48,7 +48,7 @@ void rows(const SlotMaterial& material, const Tile& tile, size_t n_rows, const u
     const size_t padded = directions.x.size();
     for (size_t r = 0; r < n_rows; ++r) std::fill_n(out + r * padded, padded, material.lambert[slot[r]]);
     for (const SlotLobe& lobe : material.lobes)
-        with_lobe(lobe, [&]<Shape shape, bool aniso, bool fresnel>() {
+        with_lobe(lobe, lobe.fresnel, [&]<Shape shape, bool aniso, bool fresnel>() {
             rows_of_lobe<shape, aniso, fresnel>(lobe, tile, n_rows, slot, wx, wy, wz, directions, out);
         });
 }

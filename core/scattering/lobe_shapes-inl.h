@@ -172,6 +172,13 @@ HWY_INLINE Factors factors_of(const LobeNumbers& n, VF z, VF dx, VF dy, VF dz) {
     return f;
 }
 
+// cos^2 of the angle between a direction and the half vector to another, cos_ab from it.
+HWY_INLINE VF cos_2_to_half(VF cos_ab) {
+    const D d;
+    const VF one = hn::Set(d, 1.0f);
+    return hn::Mul(hn::Set(d, 0.5f), hn::Add(one, hn::Clamp(cos_ab, hn::Neg(one), one)));
+}
+
 // Fresnel's equations as in material/fresnel.h; cos_2 of the angle to the half vector.
 HWY_INLINE VF fresnel_factor(VF cos_2, VF eta, VF k) {
     const D d;
@@ -230,26 +237,23 @@ HWY_INLINE VF lobe_value(const LobeNumbers& n, const Factors& a, const Factors& 
                 value = hn::Mul(hn::Mul(n.weight, falls),
                                 reciprocal(hn::Max(hn::Mul(square(safe2), smith), least)));
             }
-            if constexpr (fresnel) {
-                const VF cos_2 =
-                    hn::Mul(hn::Set(d, 0.5f), hn::Add(one, hn::Clamp(cos_ab, hn::Neg(one), one)));
-                value = hn::Mul(value, fresnel_factor(cos_2, n.eta, n.k));
-            }
+            if constexpr (fresnel) value = hn::Mul(value, fresnel_factor(cos_2_to_half(cos_ab), n.eta, n.k));
             return value;
         }
     }
 }
 
-// Calls visit.template operator()<shape, aniso, fresnel>().
+// Calls visit.template operator()<shape, aniso, fresnel>(). fresnel: of lobes that have the factor, whether
+// it is wanted.
 template <class Visit>
-HWY_INLINE void with_lobe(const SlotLobe& lobe, Visit&& visit) {
+HWY_INLINE void with_lobe(const SlotLobe& lobe, bool fresnel, Visit&& visit) {
     auto microfacet = [&]<Shape shape>() {
         if (lobe.anisotropic)
-            lobe.fresnel ? visit.template operator()<shape, true, true>()
-                         : visit.template operator()<shape, true, false>();
+            fresnel ? visit.template operator()<shape, true, true>()
+                    : visit.template operator()<shape, true, false>();
         else
-            lobe.fresnel ? visit.template operator()<shape, false, true>()
-                         : visit.template operator()<shape, false, false>();
+            fresnel ? visit.template operator()<shape, false, true>()
+                    : visit.template operator()<shape, false, false>();
     };
     switch (lobe.shape) {
         case Shape::ggx:

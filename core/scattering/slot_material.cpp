@@ -68,6 +68,9 @@ struct Builder {
         if (lobe.fresnel) {
             lobe.eta = on_slots(value_of(m.reflectance.eta));
             lobe.k = on_slots(value_of(m.reflectance.k));
+            if (!m.reflectance.eta.is_map() && !m.reflectance.k.is_map())
+                lobe.same_index = {static_cast<float>(m.reflectance.eta.at(channel, 0, 0)),
+                                   static_cast<float>(m.reflectance.k.at(channel, 0, 0))};
         }
         if (!lobe.anisotropic) {
             lobe.alpha2 = on_slots([&](int i, int j) { return std::pow(alpha_x(i, j), 2); });

@@ -1,5 +1,6 @@
 // The material on the facets of a tile as the batch kernels want it: one channel, floats per slot.
 #pragma once
+#include <optional>
 #include <vector>
 
 #include "material/material.h"
@@ -14,6 +15,11 @@ struct SlotLobe {
     enum class Shape { ggx, beckmann, blinn_phong, phong, coat_base };
     Shape shape = Shape::ggx;
     bool anisotropic = false, fresnel = false;
+    // Of all facets, if it is the same: Fresnel's factor then depends on the two directions alone.
+    struct Index {
+        float eta, k;
+    };
+    std::optional<Index> same_index;
     std::vector<float> weight;
     std::vector<float> alpha2,
         sharpness;  // alpha^2 and 1 / alpha^2 (isotropic); or the exponent in `sharpness`

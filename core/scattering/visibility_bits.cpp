@@ -84,17 +84,25 @@ void add_cosines(const Tile& tile, const std::vector<Vec3>& directions, const Vi
     const int n_chunks = static_cast<int>(tile.n_unknowns() / chunk);  // two kinds of rows of 32: no rest
     parallel_for(n_chunks, n_threads, [&](int k) {
         const size_t begin = k * chunk, end = std::min(begin + chunk, tile.n_unknowns());
-        for (size_t d = 0; d < n; ++d) {
-            const uint32_t* of = bits.of(static_cast<int>(d));
-            const float x = static_cast<float>(directions[d].x * share),
-                        y = static_cast<float>(directions[d].y * share),
-                        z = static_cast<float>(directions[d].z * share);
-            for (size_t u = begin; u < end; ++u) {
-                const size_t slot = u % tile.n_slots();
-                const float cosine =
-                    x * tile.normal_x[slot] + y * tile.normal_y[slot] + z * tile.normal_z[slot];
-                visible.values[u * stride + d] +=
-                    std::max(0.0f, cosine) * static_cast<float>(bit_count(of[u]));
+        const size_t slot = begin % tile.n_slots();
+        const float *nx = &tile.normal_x[slot], *ny = &tile.normal_y[slot], *nz = &tile.normal_z[slot];
+        // Slot by slot for one direction, then direction by direction for one slot: both are vectors so.
+        constexpr size_t block = 16;
+        float cosines[block][chunk];
+        for (size_t first = 0; first < n; first += block) {
+            const size_t count = std::min(block, n - first);
+            for (size_t c = 0; c < count; ++c) {
+                const uint32_t* of = bits.of(static_cast<int>(first + c)) + begin;
+                const float x = static_cast<float>(directions[first + c].x * share),
+                            y = static_cast<float>(directions[first + c].y * share),
+                            z = static_cast<float>(directions[first + c].z * share);
+                for (size_t u = 0; u < end - begin; ++u)
+                    cosines[c][u] = std::max(0.0f, x * nx[u] + y * ny[u] + z * nz[u]) *
+                                    static_cast<float>(bit_count(of[u]));
+            }
+            for (size_t u = 0; u < end - begin; ++u) {
+                float* to = &visible.values[(begin + u) * stride + first];
+                for (size_t c = 0; c < count; ++c) to[c] += cosines[c][u];
             }
         }
     });

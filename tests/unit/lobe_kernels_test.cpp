@@ -54,6 +54,8 @@ std::vector<NamedMaterial> materials(int nx, int ny) {
     metal.reflectance.eta = 0.27;
     metal.reflectance.k = 2.8;
     add("metal", metal);
+    metal.reflectance.eta = random_map(nx, ny, 0.2, 1.5);
+    add("metals", metal);
     Microfacet mapped = microfacet(beckmann, random_map(nx, ny, 0.1, 0.6), random_map(nx, ny, 0.2, 0.9));
     mapped.rotation_deg = random_map(nx, ny, -90, 90);
     add("maps", mapped);
@@ -111,8 +113,10 @@ TEST_P(LobeKernels, RowsAreTheMaterial) {
                         double f = 0;
                         facet.eval(own[0], seen[c], {&f, 1});
                         ASSERT_TRUE(std::isfinite(row[c])) << name;
-                        if (dot(facet.normal(), own[0]) < 1e-3 || dot(facet.normal(), seen[c]) < 1e-3) continue;
-                        EXPECT_NEAR(row[c], f, 2e-4 * f + 1e-6) << name << " slot " << slot << " column " << c;
+                        if (dot(facet.normal(), own[0]) < 1e-3 || dot(facet.normal(), seen[c]) < 1e-3)
+                            continue;
+                        EXPECT_NEAR(row[c], f, 2e-4 * f + 1e-6)
+                            << name << " slot " << slot << " column " << c;
                         ++compared;
                     }
                 }
@@ -127,35 +131,41 @@ TEST_P(LobeKernels, DirectSumsAreTheMaterialTimesWhatBothSee) {
     std::vector<Vec3> lights = directions(5, 3), views = directions(3, 4);
     for (auto* list : {&lights, &views})
         for (Vec3& d : *list) d.z = std::abs(d.z);
-    const std::vector<SubSample> samples{{0.1, 0.7}, {0.8, 0.3}, {0.45, 0.55}};
-    const VisibilityBits light_bits = find_visibility(grid, tile, lights, samples, true, 1, {}),
-                         view_bits = find_visibility(grid, tile, views, samples, true, 1, {});
-    for (const auto& [name, material] : materials(40, 8)) {
-        const SlotMaterial slots = slot_material(material, surface, tile, 0);
-        for (const bool same : {false, true}) {
-            const auto& others = same ? lights : views;
-            const VisibilityBits& other_bits = same ? light_bits : view_bits;
-            Matrix sums(static_cast<int>(lights.size()), static_cast<int>(others.size())), expected = sums;
-            add_direct(slots, tile, DirectionArrays(lights), DirectionArrays(others), same, light_bits,
-                       view_bits, 1.0 / 3, 2, {}, sums);
-            for (int kind = 0; kind < 2; ++kind)
-                for (int j = 1; j < 5; ++j)
-                    for (int i = 8; i < 28; ++i) {
-                        const size_t slot = tile.slot(kind, j, i);
-                        const FacetBrdf facet(material, surface, kind, i, j);
-                        const double area = 0.5 / facet.normal().z;
-                        for (int l = 0; l < sums.rows; ++l)
-                            for (int v = 0; v < sums.columns; ++v) {
-                                double f = 0;
-                                facet.eval(lights[l], others[v], {&f, 1});
-                                expected(l, v) += area * f * std::max(0.0, dot(facet.normal(), lights[l])) *
-                                                  std::max(0.0, dot(facet.normal(), others[v])) / 3 *
-                                                  std::popcount(light_bits.of(l)[slot] & other_bits.of(v)[slot]);
-                            }
-                    }
-            for (int l = 0; l < sums.rows; ++l)
-                for (int v = 0; v < sums.columns; ++v)
-                    EXPECT_NEAR(sums(l, v), expected(l, v), 1e-4 * expected(l, v) + 1e-6) << name << same;
+    const std::vector<SubSample> places{{0.1, 0.7}, {0.8, 0.3}, {0.45, 0.55}};
+    for (const int n_samples : {1, 3}) {
+        const std::vector<SubSample> samples(places.begin(), places.begin() + n_samples);
+        const VisibilityBits light_bits = find_visibility(grid, tile, lights, samples, true, 1, {}),
+                             view_bits = find_visibility(grid, tile, views, samples, true, 1, {});
+        for (const auto& [name, material] : materials(40, 8)) {
+            const SlotMaterial slots = slot_material(material, surface, tile, 0);
+            for (const bool same : {false, true}) {
+                const auto& others = same ? lights : views;
+                const VisibilityBits& other_bits = same ? light_bits : view_bits;
+                Matrix sums(static_cast<int>(lights.size()), static_cast<int>(others.size())),
+                    expected = sums;
+                add_direct(slots, tile, DirectionArrays(lights), DirectionArrays(others), same, light_bits,
+                           view_bits, 1.0 / n_samples, 2, {}, sums);
+                for (int kind = 0; kind < 2; ++kind)
+                    for (int j = 1; j < 5; ++j)
+                        for (int i = 8; i < 28; ++i) {
+                            const size_t slot = tile.slot(kind, j, i);
+                            const FacetBrdf facet(material, surface, kind, i, j);
+                            const double area = 0.5 / facet.normal().z;
+                            for (int l = 0; l < sums.rows; ++l)
+                                for (int v = 0; v < sums.columns; ++v) {
+                                    double f = 0;
+                                    facet.eval(lights[l], others[v], {&f, 1});
+                                    expected(l, v) +=
+                                        area * f * std::max(0.0, dot(facet.normal(), lights[l])) *
+                                        std::max(0.0, dot(facet.normal(), others[v])) / n_samples *
+                                        std::popcount(light_bits.of(l)[slot] & other_bits.of(v)[slot]);
+                                }
+                        }
+                for (int l = 0; l < sums.rows; ++l)
+                    for (int v = 0; v < sums.columns; ++v)
+                        EXPECT_NEAR(sums(l, v), expected(l, v), 1e-4 * expected(l, v) + 1e-6)
+                            << name << same << n_samples;
+            }
         }
     }
 }
