@@ -105,13 +105,14 @@ class Columns {
         return best;
     }
 
-    // The elevation where rays begin to pass, halved between the horizontal and 80 degrees: the same if what
-    // blocks a ray is blocked below it, too.
+    // The elevation from which on all rays pass. Found from above: what blocks one elevation need not block
+    // those below it, and halving between two elevations ends at any one of the borders (which left out 5 to
+    // 20 % of the points here where this leaves out 1 to 10, and the file 3 to 8).
     double elevation_by_rays(double x, double y, double kappa) const {
         const double tallest = *std::max_element(heights_.begin(), heights_.end());
         auto blocked = [&](double elevation) {
             const double rise = std::tan(elevation);
-            for (double s = 0.1; s < 120; s += 0.1) {
+            for (double s = 0.05; s < 120; s += 0.05) {
                 const double across = s * c_, up = 1 / kappa + rise * s,
                              over = std::hypot(across, up) - 1 / kappa;
                 if (over > tallest) return false;
@@ -119,8 +120,12 @@ class Columns {
             }
             return false;
         };
-        double low = 0, high = radians(80);
-        for (int n = 0; n < 14; ++n) {
+        const double step = radians(0.5);
+        double low = radians(88);
+        while (low > 0 && !blocked(low)) low -= step;
+        if (low <= 0) return 0;
+        double high = low + step;
+        for (int n = 0; n < 8; ++n) {
             const double middle = 0.5 * (low + high);
             (blocked(middle) ? low : high) = middle;
         }
@@ -179,7 +184,7 @@ TEST(CurvatureColumns, StatisticsAtObliqueAzimuths) {
         EXPECT_LT(rms, 1.2 * stated + 2 * of_stated);
         if (s.at("phi_deg") == 45) {
             EXPECT_GT(rms, 0.8 * stated - 2 * of_stated);
-            EXPECT_LT(dropped, 0.25 * (n + dropped));
+            EXPECT_LT(dropped, 0.12 * (n + dropped));
         }
     }
     EXPECT_EQ(tables, 12);
