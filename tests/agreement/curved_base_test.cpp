@@ -7,6 +7,7 @@
 #include "agreement/curved_patch.h"
 #include "agreement/measured.h"
 #include "base/error.h"
+#include "measure/base_doubt.h"
 #include "measure/reference.h"
 #include "scattering/tile.h"
 #include "validation/statistics.h"
@@ -78,6 +79,57 @@ TEST_P(CurvedBase, LitMasks) {
     std::printf("%s: %lld of %lld rays differ, %lld dark\n", GetParam().name, wrong, rays, dark);
     EXPECT_LT(wrong, rays / 250);
     EXPECT_GT(dark, rays / 10);
+}
+
+// The lit projected area of all facets, by the march and by Embree for the same points: rms over azimuths.
+TEST(CurvedBaseDoubt, HoldsWhatIsLeftOfTheDirectTerm) {
+    constexpr int places = 32;
+    for (const double kappa : {1.0 / 30, 1.0 / 60}) {
+        const HeightField surface = relief_on({kappa, 0, radians(30)});
+        const MarchGrid grid = make_march_grid(surface);
+        const Tile tile = make_tile(surface, {0, 0, size, size}, {0, 0, size, size}, 1);
+        const auto patches = patches_of(surface);
+        for (const double theta : {60.0, 80.0}) {
+            double squares = 0;
+            for (int azimuth = 0; azimuth < 12; ++azimuth) {
+                const Vec3 d = to_vector({theta, 5.0 + 30 * azimuth});
+                double ours = 0, truth = 0;
+                for (int s = 0; s < 2 * places; ++s) {
+                    const FacetPoint start =
+                        facet_point(s % 2, fractional_part(0.3 + 0.7548776662466927 * (s / 2)),
+                                    fractional_part(0.1 + 0.5698402909980532 * (s / 2)));
+                    std::vector<uint32_t> visible(size);
+                    visible_along(grid, d, start, 16384, {0, 0, size, size}, visible.data());
+                    for (int cell = 0; cell < size * size; ++cell) {
+                        const int i = cell % size, j = cell / size;
+                        const CurvedPatch::Point p = patches[0]->point(i, j, s % 2, start.u, start.v);
+                        const Vec3 w = p.in_space(d, surface.base);
+                        CurvedPatch::Point hit;
+                        const double area = p.area * dot(w, p.normal);
+                        if (area > 0 && !patches[0]->trace(p.position, w, &hit)) truth += area;
+                        const size_t slot = tile.slot(s % 2, j, i);
+                        if (visible[j] >> i & 1)
+                            ours += 2 * std::pow(tile.sqrt_area[slot], 2) *
+                                    std::max(0.0, tile.normal_x[slot] * d.x + tile.normal_y[slot] * d.y +
+                                                      tile.normal_z[slot] * d.z);
+                    }
+                }
+                squares += std::pow(ours / truth - 1, 2) / 12;
+            }
+            const double off = std::sqrt(squares), doubt = base_doubt(surface, to_vector({theta, 0}));
+            std::printf("kappa %.4f theta %g: off by %.3f %%, doubt %.3f %%\n", kappa, theta, 100 * off,
+                        100 * doubt);
+            EXPECT_LT(off, doubt);
+            EXPECT_GT(off, 0.1 * doubt);
+        }
+    }
+    EXPECT_EQ(base_doubt(relief_on({}), to_vector({80, 0})), 0);
+    // A row has that of its light and of its view.
+    const HeightField surface = relief_on({1.0 / 30, 0, 0});
+    const BrdfResult result = measure(surface, gray({1}), plan_for_target({{80, 0}}, {{0, 0}}, 0.01));
+    const double doubt = base_doubt(surface, to_vector({80, 0}));
+    EXPECT_GE(result.table.bias[0], 0.999 * doubt * result.table.f[0]);
+    EXPECT_GE(result.report.relative_error, doubt);
 }
 
 TEST_P(CurvedBase, OrdersOfScattering) {
