@@ -32,9 +32,22 @@ ordered_json head_of(const LoadedJob& job, const Btf& btf) {
     head["quantity"] =
         "apparent BRDF of a pixel, L / (E0 cos_i) in 1/sr: the radiance L that its view ray meets over the "
         "irradiance of the flat base plane; no other cosine";
+    if (job.environment)
+        head["quantity"] =
+            "L / E in 1/sr: the radiance L that the view ray of a pixel meets over "
+            "the environment's irradiance E of the flat base plane, its channel of `irradiance`";
     head["angles"] = "degrees; theta from the normal +z, phi from +x (along columns) towards +y (along rows)";
     head["channels"] = btf.mean.channels;
-    head["incident_deg"] = angles(plan.incident);
+    if (job.environment) {
+        head["environment_hash"] = environment_hash(*job.environment);
+        const Environment sky = for_channels(*job.environment, btf.shape.n_channels);
+        head["irradiance"] = ordered_json::array();
+        for (int c = 0; c < sky.n_channels; ++c) head["irradiance"].push_back(horizontal_irradiance(sky, c));
+        head["irradiance_says"] =
+            "of the flat base plane, in the unit of the environment's radiance times sr";
+    } else {
+        head["incident_deg"] = angles(plan.incident);
+    }
     if (plan.cameras) {
         ordered_json places = ordered_json::array();
         for (const Vec3& place : camera_places(s, plan)) places.push_back({place.x, place.y, place.z});
@@ -175,7 +188,7 @@ StoredBtf read_factored_btf(const std::string& path) {
         head.at("form").refuse("must be \"factored\": images cannot be expanded");
     constexpr size_t most = 1 << 24;
     BtfShape& shape = stored.btf.shape;
-    shape.n_lights = static_cast<int>(head.at("incident_deg").array_size());
+    shape.n_lights = head.has("irradiance") ? 1 : static_cast<int>(head.at("incident_deg").array_size());
     shape.n_views = count(head.at("n_views"), most);
     shape.n_channels = static_cast<int>(head.at("channels").array_size());
     shape.pixels_x = count(head.at("pixels").element(0), most);

@@ -17,6 +17,7 @@ std::vector<AnglesDeg> parse_directions(const JsonNode& node);  // parse_directi
 void parse_direction_pairs(const JsonNode& measure, BrdfPlan& plan);     // parse_directions.cpp
 // "max_order" of a measurement: 0 for "all", which is the default.
 int parse_max_order(const JsonNode& measure);  // parse_brdf.cpp
+int parse_azimuths(const JsonNode& node);      // parse_environment.cpp; of the horizon slices
 // Sets project and, from it, the directions of the plan, whose accuracy must be set.
 void parse_projection(const JsonNode& measure, BrdfPlan& plan);          // parse_projection.cpp
 BrdfPlan parse_brdf(const JsonNode& measure, const Accuracy& accuracy);  // parse_brdf.cpp

@@ -17,7 +17,6 @@ constexpr uint64_t max_pixels = 16384, max_pixel_samples = 256, max_cameras = 10
 
 // What both kinds have in common.
 void parse_pictures(const JsonNode& measure, const Accuracy& accuracy, BtfPlan& plan) {
-    plan.incident = parse_directions(measure.at("incident"));
     if (const auto pixels = measure.find("pixels")) {
         if (pixels->array_size() != 2) pixels->refuse("must be [columns, rows], two whole numbers");
         plan.pixels_x = static_cast<int>(pixels->element(0).whole_number(1, max_pixels));
@@ -34,6 +33,7 @@ void parse_pictures(const JsonNode& measure, const Accuracy& accuracy, BtfPlan& 
 BtfPlan parse_btf(const JsonNode& measure, const Accuracy& accuracy) {
     measure.allow_keys({"kind", "incident", "outgoing", "pixels", "pixel_samples", "plane", "max_order"});
     BtfPlan plan;
+    plan.incident = parse_directions(measure.at("incident"));
     plan.outgoing = parse_directions(measure.at("outgoing"));
     parse_pictures(measure, accuracy, plan);
     return plan;
@@ -53,9 +53,14 @@ CameraPlane parse_cameras(const JsonNode& node) {
 }
 
 LightFieldPlan parse_light_field(const JsonNode& measure, const Accuracy& accuracy) {
-    measure.allow_keys(
-        {"kind", "incident", "outgoing", "cameras", "pixels", "pixel_samples", "plane", "max_order"});
+    measure.allow_keys({"kind", "incident", "azimuths", "outgoing", "cameras", "pixels", "pixel_samples",
+                        "plane", "max_order"});
     LightFieldPlan plan;
+    if (const auto incident = measure.find("incident")) plan.incident = parse_directions(*incident);
+    if (const auto azimuths = measure.find("azimuths")) {
+        if (!plan.incident.empty()) azimuths->refuse("only an environment has azimuths: leave it out");
+        plan.azimuths = parse_azimuths(*azimuths);
+    }
     if (const auto cameras = measure.find("cameras")) {
         if (const auto outgoing = measure.find("outgoing"))
             outgoing->refuse(
@@ -71,11 +76,14 @@ LightFieldPlan parse_light_field(const JsonNode& measure, const Accuracy& accura
 nlohmann::json canonical_plan(const BtfPlan& plan, const char* kind) {
     nlohmann::json j{
         {"kind", kind},
-        {"incident", canonical(plan.incident)},
         {"pixel_samples", plan.pixel_samples},
         {"plane", plan.plane == BtfPlan::Plane::top ? "top" : "zero"},
         {"max_order", plan.max_order == 0 ? nlohmann::json("all") : nlohmann::json(plan.max_order)},
         {"accuracy", canonical(plan.accuracy)}};
+    if (plan.incident.empty())
+        j["azimuths"] = plan.azimuths;
+    else
+        j["incident"] = canonical(plan.incident);
     if (plan.cameras) {
         const CameraPlane& c = *plan.cameras;
         j["cameras"] = {
@@ -106,11 +114,11 @@ size_t preview_view(const BtfPlan& plan) {
     return nearest(plan.outgoing, {0, 0});
 }
 
-// images: [light][channel][pixel] of that view. Under the light nearest 45 degrees from the upper left; white
-// is a white plane.
+// images: [light][channel][pixel] of that view. Under the light nearest 45 degrees from the upper left, or
+// the environment; white is a white plane.
 void write_preview(const LoadedJob& job, const BtfShape& shape, const std::vector<uint16_t>& images,
                    const std::string& path) {
-    const size_t light = nearest(pictures_of(job).incident, {45, 135});
+    const size_t light = job.environment ? 0 : nearest(pictures_of(job).incident, {45, 135});
     PngChannels picture;
     picture.width = shape.pixels_x;
     picture.height = shape.pixels_y;
@@ -142,7 +150,8 @@ Report run_glossy(const LoadedJob& job, const std::vector<OutputRequest>& files,
                         "the factored form holds one radiance for each facet and light, and a glossy facet "
                         "sends another to every view: ask for \"images\"");
     const BtfPlan& plan = pictures_of(job);
-    GlossyBtf glossy(job.surface.surface, job.material, plan, options, monitor);
+    GlossyBtf glossy(job.surface.surface, job.material, plan, options, monitor,
+                     job.environment ? &*job.environment : nullptr);
     const int shown = static_cast<int>(preview_view(plan));
     std::vector<uint16_t> preview;
     const auto keep_preview = [&](int view, std::span<const uint16_t> images) {
@@ -166,7 +175,8 @@ Report run_glossy(const LoadedJob& job, const std::vector<OutputRequest>& files,
 Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
            const Monitor& monitor) {
     if (!pure_lambertian(job.material)) return run_glossy(job, files, options, monitor);
-    BtfResult result = measure_btf(job.surface.surface, job.material, pictures_of(job), options, monitor);
+    BtfResult result = measure_btf(job.surface.surface, job.material, pictures_of(job), options, monitor,
+                                   job.environment ? &*job.environment : nullptr);
     Table& mean = result.btf.mean;
     mean.provenance = result.report.settings;
     for (const OutputRequest& file : files) {
@@ -206,7 +216,7 @@ MeasureKind btf_kind() {
             [](const MeasurePlan& plan) { return canonical_plan(std::get<BtfPlan>(plan), "btf"); },
             predict,
             run,
-            false,
+            MeasureKind::Light::directions,
             is_served};
 }
 
@@ -221,7 +231,7 @@ MeasureKind light_field_kind() {
         [](const MeasurePlan& plan) { return canonical_plan(std::get<LightFieldPlan>(plan), "light_field"); },
         predict,
         run,
-        false,
+        MeasureKind::Light::either,
         is_served};
 }
 

@@ -15,14 +15,13 @@
 namespace gonio {
 namespace {
 
-constexpr uint64_t max_pixels = 16384, max_azimuths = 1024;
+constexpr uint64_t max_pixels = 16384;
 
 MeasurePlan parse(const JsonNode& measure, const Accuracy& accuracy) {
     measure.allow_keys({"kind", "outgoing", "azimuths", "pixels", "plane", "max_order"});
     RelightPlan plan;
     plan.outgoing = parse_directions(measure.at("outgoing"));
-    if (const auto azimuths = measure.find("azimuths"))
-        plan.azimuths = static_cast<int>(azimuths->whole_number(3, max_azimuths));
+    if (const auto azimuths = measure.find("azimuths")) plan.azimuths = parse_azimuths(*azimuths);
     if (const auto pixels = measure.find("pixels")) {
         if (pixels->array_size() != 2) pixels->refuse("must be [columns, rows], two whole numbers");
         plan.pixels_x = static_cast<int>(pixels->element(0).whole_number(1, max_pixels));
@@ -141,6 +140,13 @@ std::vector<size_t> images_shape(const Relit& relit) {
     return {size(relit.n_views), size(relit.n_channels), size(relit.pixels_y), size(relit.pixels_x)};
 }
 
+// One radiance a facet, or, of glossy ones, one for every view.
+std::vector<size_t> facets_shape(const Relit& relit) {
+    const auto channels = static_cast<size_t>(relit.n_channels);
+    if (relit.radiance.size() == channels * relit.n_facets) return {channels, relit.n_facets};
+    return {channels, static_cast<size_t>(relit.n_views), relit.n_facets};
+}
+
 void write_csv(const LoadedJob& job, const RelightResult& result, const std::string& path) {
     const Relit& relit = result.relit;
     const auto& views = std::get<RelightPlan>(job.job.plan).outgoing;
@@ -167,9 +173,8 @@ void write_npy(const LoadedJob& job, const RelightResult& result, const std::str
 // Everything: means in the first line, then the images and the radiance of every facet part.
 void write_arrays(const LoadedJob& job, const RelightResult& result, const std::string& path) {
     const Relit& relit = result.relit;
-    const std::vector<ArraySection> sections = {
-        {"images", "<f4", images_shape(relit)},
-        {"facet_radiance", "<f4", {static_cast<size_t>(relit.n_channels), relit.n_facets}}};
+    const std::vector<ArraySection> sections = {{"images", "<f4", images_shape(relit)},
+                                                {"facet_radiance", "<f4", facets_shape(relit)}};
     write_array_file(path, means_of(job, result), sections, [&](ArrayWriter& writer) {
         writer.append(std::span<const float>(relit.images));
         writer.append(std::span<const float>(relit.radiance));
@@ -202,9 +207,14 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
 }  // namespace
 
 MeasureKind relight_kind() {
-    return {
-        "relight", "relight", {"csv", "json", "exr", "png", "arrays", "npy"}, parse, canonical_plan, predict,
-        run,       true};
+    return {"relight",
+            "relight",
+            {"csv", "json", "exr", "png", "arrays", "npy"},
+            parse,
+            canonical_plan,
+            predict,
+            run,
+            MeasureKind::Light::environment};
 }
 
 }  // namespace gonio

@@ -30,8 +30,9 @@ struct MeasureKind {
     // cancelled.
     Report (*run)(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
                   const Monitor& monitor);
-    // Whether it takes the "environment" of the job for its light, and needs one.
-    bool under_environment = false;
+    // Where the light comes from: directions of its own, the "environment" of the job, or either of the two,
+    // "incident" or "environment".
+    enum class Light { directions, environment, either } light = Light::directions;
     // Whether the service keeps this job's product in a format of its process; null: in all of them.
     bool (*is_served)(const LoadedJob& job, const std::string& format) = nullptr;
 };

@@ -39,4 +39,9 @@ EnvironmentSource parse_environment(const JsonNode& node, const std::string& fol
     return source;
 }
 
+int parse_azimuths(const JsonNode& node) {
+    constexpr uint64_t fewest = 3, most = 1024;
+    return static_cast<int>(node.whole_number(fewest, most));
+}
+
 }  // namespace gonio

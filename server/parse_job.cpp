@@ -35,6 +35,29 @@ std::vector<OutputRequest> parse_outputs(const std::optional<JsonNode>& node, co
     return outputs;
 }
 
+// The environment, if that is the light: a measurement has lights of its own, or it, and never both.
+std::optional<EnvironmentSource> parse_light(const JsonNode& root, const MeasureKind& kind,
+                                             const std::string& folder) {
+    using Light = MeasureKind::Light;
+    const auto environment = root.find("environment");
+    if (kind.light == Light::directions) {
+        if (environment)
+            environment->refuse("a measurement of kind \"" + kind.name + "\" has lights of its own");
+        return {};
+    }
+    if (kind.light == Light::either) {
+        const JsonNode measure = root.at("measure");
+        if (!environment) {
+            measure.at("incident");
+            return {};
+        }
+        if (const auto incident = measure.find("incident"))
+            incident->refuse(
+                "the environment is the light: leave one of \"incident\" and \"environment\" out");
+    }
+    return parse_environment(root.at("environment"), folder);
+}
+
 }  // namespace
 
 std::string resolved(const std::string& path, const std::string& folder) {
@@ -49,19 +72,11 @@ Job parse_job(std::string_view text, const JobOrigin& origin) {
     MaterialSource material = parse_material(root.at("material"), origin.folder);
     const JsonNode measure = root.at("measure");
     const MeasureKind& kind = parse_kind(measure);
-    std::optional<EnvironmentSource> environment;
-    if (kind.under_environment)
-        environment = parse_environment(root.at("environment"), origin.folder);
-    else if (const auto unused = root.find("environment"))
-        unused->refuse("a measurement of kind \"" + kind.name + "\" has lights of its own");
+    const std::optional<EnvironmentSource> environment = parse_light(root, kind, origin.folder);
     MeasurePlan plan = kind.parse(measure, parse_accuracy(root.find("accuracy")));
     std::vector<OutputRequest> outputs = parse_outputs(root.find("output"), product_of(plan), origin.name);
-    return {std::move(surface),
-            std::move(material),
-            std::move(plan),
-            std::move(outputs),
-            parse_base(root.find("base")),
-            std::move(environment)};
+    return {std::move(surface), std::move(material),           std::move(plan),
+            std::move(outputs), parse_base(root.find("base")), environment};
 }
 
 SurfaceSource parse_surface_job(std::string_view text, const JobOrigin& origin) {

@@ -36,7 +36,7 @@ LoadedJob load_job(const Job& job, const std::optional<ReferenceOptions>& refere
     if (reference && !std::holds_alternative<BrdfPlan>(job.plan))
         throw Error(ErrorCode::invalid_input, "/measure/kind", kind_of(job.plan).name,
                     "the path tracer measures brdf jobs only");
-    if (job.base.is_curved() && std::holds_alternative<RelightPlan>(job.plan))
+    if (job.base.is_curved() && job.environment)
         throw Error(ErrorCode::invalid_input, "/base", "",
                     "an environment lights flat bases only; \"brdf\", \"btf\" and \"maps\" know curved ones");
     LoadedJob loaded{job, load_surface(job.surface, job.base), {}, reference};

@@ -98,6 +98,7 @@ export const outgoing = {
 
 const maxOrder = { key: "max_order", label: "Orders of scattering", kind: "text", value: "all", hint: "“all”, or how many" };
 const pixels = { key: "pixels", label: "Pixels, columns and rows", kind: "numbers", hint: "empty: one a point of the relief" };
+const azimuths = { key: "azimuths", label: "Azimuths of direct light", kind: "number", value: "16" };
 const samplesOf = { key: "samples", label: "Scattered samples", kind: "number", hint: "empty: a full grid" };
 
 // What is measured: its kind, which directions it takes, its own keys. `compose` puts them in their place.
@@ -112,10 +113,10 @@ export const measurements = {
     compose: ({ max_order, ...project }) => ({ max_order, project }) },
     btf: { label: "BTF: images from every side", kind: "btf", takes: ["incident", "outgoing"], fields: [maxOrder, pixels] },
     light_field: { label: "Light field", kind: "light_field", takes: ["incident", "outgoing"], fields: [maxOrder, pixels] },
+    environment_field: { label: "Light field under an environment", kind: "light_field", takes: ["environment", "outgoing"], fields: [maxOrder, pixels, azimuths] },
     maps: { label: "Maps of light, shadow and sky", kind: "maps", takes: ["incident", "outgoing"], fields: [maxOrder,
         { key: "sky_directions", label: "Directions of the sky", kind: "number", value: "256" }] },
-    relight: { label: "Under an environment", kind: "relight", takes: ["environment", "outgoing"], fields: [maxOrder, pixels,
-        { key: "azimuths", label: "Azimuths of direct light", kind: "number", value: "16" }] },
+    relight: { label: "Under an environment", kind: "relight", takes: ["environment", "outgoing"], fields: [maxOrder, pixels, azimuths] },
 };
 
 export const uniformFields = [{ key: "radiance", label: "Radiance from everywhere", kind: "number", value: "1" }];

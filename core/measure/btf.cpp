@@ -17,6 +17,7 @@
 #include "measure/mesh_bias.h"
 #include "measure/pixel_means.h"
 #include "measure/run.h"
+#include "measure/sky_light.h"
 #include "scattering/picture_kernels.h"
 
 namespace gonio {
@@ -54,7 +55,7 @@ double peak_bytes(const BtfShape& shape, const Accuracy::Samples& samples, const
 class Measurement {
   public:
     Measurement(const HeightField& surface, const Material& material, const BtfPlan& plan,
-                const RunOptions& options, const Monitor& monitor)
+                const RunOptions& options, const Monitor& monitor, const Environment* environment)
         : surface_(surface),
           plan_(plan),
           options_(options),
@@ -65,6 +66,9 @@ class Measurement {
           light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor),
           bent_grid_(bent_view_grid(surface, plan)) {
         btf().shape = btf_shape(surface, material, plan, samples_of(plan).refinement);
+        if (environment)
+            sky_.emplace(surface, with_unit_irradiance(for_channels(*environment, btf().shape.n_channels)),
+                         btf().shape.n_channels, plan.azimuths, plan.accuracy.seed, options, monitor);
         btf().mean.channels = material.channels;
         btf().mean.incident = plan.incident;
         btf().mean.outgoing = view_angles(surface, plan);
@@ -95,7 +99,7 @@ class Measurement {
   private:
     Btf& btf() { return result_.btf; }
     const Btf& btf() const { return result_.btf; }
-    size_t rows() const { return lights_.size() * views_.size(); }
+    size_t rows() const { return btf().shape.n_lights * views_.size(); }
     int n_runs() const { return means_.count(); }
 
     bool wants_more() const {
@@ -116,10 +120,8 @@ class Measurement {
         size_t sum = 0;
         for (int first = 0; first < btf().shape.n_lights; first += column_block) {
             const int n = std::min(column_block, btf().shape.n_lights - first);
-            const LightIrradiance direct =
-                light_.irradiance({lights_.begin() + first, lights_.begin() + first + n});
-            const std::vector<Fields>& radiosity =
-                light_.radiosity({lights_.begin() + first, lights_.begin() + first + n}, direct.lights);
+            const std::vector<Fields> of_sky = sky_ ? radiosity_of_sky() : std::vector<Fields>();
+            const std::vector<Fields>& radiosity = sky_ ? of_sky : radiosity_of_lights(first, n);
             for (int c = 0; c < btf().shape.n_channels; ++c, ++sum) {
                 add_means(radiosity[c], c, first, run);
                 add_facets(radiosity[c], c, first, sum);
@@ -129,8 +131,24 @@ class Measurement {
         if (n_runs() >= fewest_runs) estimate_errors();
     }
 
-    // L / (E0 cos_i) of an exitance.
-    double unit(int light) const { return 1 / (pi * lights_[light].z); }
+    const std::vector<Fields>& radiosity_of_lights(int first, int n) {
+        const std::vector<Vec3> lights(lights_.begin() + first, lights_.begin() + first + n);
+        return light_.radiosity(lights, light_.irradiance(lights).lights);
+    }
+    // One column each: a channel has light of its own.
+    std::vector<Fields> radiosity_of_sky() {
+        std::vector<Fields> of_channel;
+        const std::vector<Fields>& radiosity = light_.radiosity(sky_->irradiance(light_, n_runs()));
+        for (int c = 0; c < btf().shape.n_channels; ++c) {
+            Fields& own = of_channel.emplace_back(radiosity[c].n_unknowns(), 1);
+            std::fill(own.values().begin(), own.values().end(), 0.0f);
+            for (size_t u = 0; u < own.n_unknowns(); ++u) value(own, u, 0) = value(radiosity[c], u, c);
+        }
+        return of_channel;
+    }
+
+    // L / (E0 cos_i) of an exitance, or L / E of one under an environment of irradiance 1.
+    double unit(int light) const { return 1 / (sky_ ? pi : pi * lights_[light].z); }
     size_t plane(int channel, int light) const {
         return static_cast<size_t>(channel) * btf().shape.n_lights + light;
     }
@@ -197,7 +215,7 @@ class Measurement {
 
     void estimate_errors() {
         RowGroups groups;
-        groups.n_lights = static_cast<int>(lights_.size());
+        groups.n_lights = btf().shape.n_lights;
         groups.n_views = static_cast<int>(views_.size());
         for (size_t r = 0; r < rows(); ++r) {
             groups.light.push_back(static_cast<int>(r / views_.size()));
@@ -333,6 +351,7 @@ class Measurement {
     std::chrono::steady_clock::time_point started_;
     FacetLight light_;
     std::optional<MarchGrid> bent_grid_;  // of the views
+    std::optional<SkyLight> sky_;
     BtfResult result_;
     std::optional<PixelMeans> pixel_means_;
     std::vector<int> probed_views_;  // with other places of the pixels
@@ -349,8 +368,8 @@ class Measurement {
 }  // namespace
 
 BtfResult measure_btf(const HeightField& surface, const Material& material, const BtfPlan& plan,
-                      const RunOptions& options, const Monitor& monitor) {
-    return Measurement(surface, material, plan, options, monitor).run();
+                      const RunOptions& options, const Monitor& monitor, const Environment* environment) {
+    return Measurement(surface, material, plan, options, monitor, environment).run();
 }
 
 Prediction predict_btf(const HeightField& surface, const Material& material, const BtfPlan& plan) {

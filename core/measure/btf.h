@@ -2,9 +2,10 @@
 // every light (Heidrich et al. 2000, sec. 6).
 //
 // A value is the apparent BRDF of a pixel, L / (E0 cos_i) in 1/sr: the radiance L that the pixel's view ray
-// meets, over the irradiance E0 cos_i of the flat base plane. So its mean over one period is the BRDF of the
-// relief. It has no other cosine, and is no BRDF of any one point: shadows, masks and light from elsewhere
-// are in it, and it is not reciprocal.
+// meets, over the irradiance E0 cos_i of the flat base plane (under an environment over its irradiance of
+// that plane, channel by channel). So its mean over one period is the BRDF of the relief. It has no other
+// cosine, and is no BRDF of any one point: shadows, masks and light from elsewhere are in it, and it is not
+// reciprocal.
 //
 // Facet parts have one radiance each, and views only choose among them: so radiances and view maps are the
 // whole of it, 20 times smaller than the images and without loss (shared/performance_techniques 4).
@@ -18,6 +19,7 @@
 #include "measure/plan.h"
 #include "measure/prediction.h"
 #include "measure/report.h"
+#include "scattering/environment.h"
 #include "table/table.h"
 
 namespace gonio {
@@ -31,7 +33,9 @@ struct CameraPlane {
 };
 
 struct BtfPlan {
-    std::vector<AnglesDeg> incident, outgoing;
+    std::vector<AnglesDeg> incident;  // none: under an environment
+    int azimuths = 16;                // of its horizon slices, >= 3
+    std::vector<AnglesDeg> outgoing;
     std::optional<CameraPlane> cameras;  // instead of outgoing directions
     int pixels_x = 0, pixels_y = 0;      // over the measured rectangle; 0: one a cell
     // Places inside a pixel whose values are averaged; 1: its centre. With one pixel a cell and one sample, a
@@ -58,18 +62,20 @@ struct BtfShape {
 
 struct Btf {
     BtfShape shape;
-    std::vector<uint16_t> radiance;   // [channel][light][facet]: bits of a half each, in 1/sr as above
+    // [channel][light][facet]: bits of a half each, in 1/sr as above; an environment is one light.
+    std::vector<uint16_t> radiance;
     std::vector<uint32_t> view_maps;  // [view][sample][pixel]: the facet
     // Of the images: their means over the pixels, which estimate the BRDF. se: of the random runs; bias: what
     // the places of the pixels and the orders left out may do, and a guess (mesh_bias.h) of what irradiance
-    // does that is constant over a facet part.
+    // does that is constant over a facet part. [channel][light][view], also under an environment, where its
+    // `incident` is empty.
     Table mean;
-    std::vector<double> pixel_se;  // [channel][light], 1/sr: standard error of one facet's value, rms over
-                                   // the area of the relief
+    std::vector<double> pixel_se;  // [channel][light], 1/sr: standard error of one facet's value,
+                                   // rms over the area of the relief
 };
 
 // Radiance over position and direction: the same numbers, as a kind of measurement of its own. Planes and
-// directions: a BTF whose pixels are read for one light; two planes: cameras.
+// directions: a BTF whose pixels are read for one light; two planes: cameras. Or under an environment.
 struct LightFieldPlan : BtfPlan {};
 
 // Where the cameras of a plan stand: x, y of the surface and z above its mean height, metres.
@@ -80,9 +86,12 @@ struct BtfResult {
     Report report;
 };
 
-// Throws Error: for materials that are not Lambertian; limit if it does not fit options.max_bytes; cancelled.
+// environment: the light of a plan without incident directions, and only of such a one. Throws Error: for
+// materials that are not Lambertian; for an environment on a curved base, or an RGB one on a spectrum; limit
+// if it does not fit options.max_bytes; cancelled.
 BtfResult measure_btf(const HeightField& surface, const Material& material, const BtfPlan& plan,
-                      const RunOptions& options, const Monitor& monitor = {});
+                      const RunOptions& options, const Monitor& monitor = {},
+                      const Environment* environment = nullptr);
 
 // bytes: of one output of images, two bytes a pixel; the factored form takes shape.radiance_size() and
 // maps_size().

@@ -55,7 +55,7 @@ Vec3 pixel_to_camera(const HeightField& s, double plane_height, const Vec3& came
 
 BtfShape btf_shape(const HeightField& s, const Material& material, const BtfPlan& plan, int refinement) {
     return {plan.cameras ? plan.cameras->n_u * plan.cameras->n_v : static_cast<int>(plan.outgoing.size()),
-            static_cast<int>(plan.incident.size()),
+            std::max(1, static_cast<int>(plan.incident.size())),  // an environment is one light
             static_cast<int>(material.channels.size()),
             plan.pixels_x > 0 ? plan.pixels_x : s.nx - 2 * s.border_x,
             plan.pixels_y > 0 ? plan.pixels_y : s.ny - 2 * s.border_y,

@@ -11,6 +11,8 @@
 #include "measure/btf_views.h"
 #include "measure/describe.h"
 #include "measure/glossy_pixels.h"
+#include "measure/glossy_sky.h"
+#include "measure/glossy_sky_pictures.h"
 #include "measure/mesh_bias.h"
 
 namespace gonio {
@@ -19,6 +21,7 @@ namespace {
 constexpr int fewest_runs = 2, most_runs = 32, most_probes = 4, more_places = 4;
 
 Accuracy::Samples samples_of(const BtfPlan& plan) {
+    if (plan.incident.empty()) return sky_pictures_samples(plan);
     return plan.accuracy.samples.value_or(Accuracy::Samples{4, 64, 1, fewest_runs});
 }
 
@@ -28,9 +31,7 @@ struct ViewSums {
     std::vector<double> squares, sum_squares;  // [channel][light]
 };
 
-}  // namespace
-
-class GlossyBtf::Measurement {
+class Measurement final : public GlossyPictures {
   public:
     Measurement(const HeightField& surface, const Material& material, const BtfPlan& plan,
                 const RunOptions& options, const Monitor& monitor)
@@ -56,10 +57,10 @@ class GlossyBtf::Measurement {
         describe();
     }
 
-    const BtfShape& shape() const { return shape_; }
-    const Report& report() const { return report_; }
+    const BtfShape& shape() const override { return shape_; }
+    const Report& report() const override { return report_; }
 
-    Btf pictures(const std::function<void(int, std::span<const uint16_t>)>& on_view) {
+    Btf pictures(const OnView& on_view) override {
         const size_t n_lights = shape_.n_lights, n_views = shape_.n_views,
                      planes = shape_.n_channels * n_lights;
         std::vector<std::vector<float>> runs(pixels_.n_runs(), std::vector<float>(planes * n_views));
@@ -253,20 +254,12 @@ class GlossyBtf::Measurement {
     double error_ = 0, unresolved_ = 0;
 };
 
-GlossyBtf::GlossyBtf(const HeightField& surface, const Material& material, const BtfPlan& plan,
-                     const RunOptions& options, const Monitor& monitor)
-    : measurement_(std::make_unique<Measurement>(surface, material, plan, options, monitor)) {}
-GlossyBtf::~GlossyBtf() = default;
+}  // namespace
 
-const BtfShape& GlossyBtf::shape() const {
-    return measurement_->shape();
-}
-const Report& GlossyBtf::report() const {
-    return measurement_->report();
-}
-Btf GlossyBtf::pictures(const std::function<void(int, std::span<const uint16_t>)>& on_view) {
-    return measurement_->pictures(on_view);
-}
+GlossyBtf::GlossyBtf(const HeightField& surface, const Material& material, const BtfPlan& plan,
+                     const RunOptions& options, const Monitor& monitor, const Environment* environment)
+    : pictures_(environment ? glossy_sky_pictures(surface, material, plan, *environment, options, monitor)
+                            : std::make_unique<Measurement>(surface, material, plan, options, monitor)) {}
 
 Prediction predict_glossy_btf(const HeightField& surface, const Material& material, const BtfPlan& plan) {
     const Accuracy::Samples samples = samples_of(plan);
@@ -280,11 +273,18 @@ Prediction predict_glossy_btf(const HeightField& surface, const Material& materi
         0.05 + seen * (5e-9 + 4e-9 * samples.replicates) +
         samples.replicates * facets *
             (1e-6 + 20e-9 * lights * samples.sub_samples + 2e-9 * channels * lights * samples.directions);
+    if (plan.incident.empty())
+        prediction.cpu_seconds =
+            0.05 + samples.replicates * GlossySky::run_seconds(surface, samples, shape.n_channels,
+                                                               plan.azimuths,
+                                                               static_cast<double>(shape.maps_size()));
     if (plan.accuracy.max_seconds)
         prediction.cpu_seconds = std::min(prediction.cpu_seconds, *plan.accuracy.max_seconds);
     prediction.memory_bytes = (64 << 20) +
                               samples.replicates * glossy_run_bytes(shape, samples, surface.base) +
                               2.0 * static_cast<double>(shape.images_size()) / shape.n_views;
+    if (plan.incident.empty())
+        prediction.memory_bytes = (64 << 20) + sky_pictures_bytes(surface, shape, samples);
     prediction.table_bytes = 2.0 * static_cast<double>(shape.images_size());
     return prediction;
 }

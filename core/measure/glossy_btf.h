@@ -10,26 +10,34 @@
 
 namespace gonio {
 
+class GlossyPictures {
+  public:
+    using OnView = std::function<void(int view, std::span<const uint16_t> images)>;
+    virtual ~GlossyPictures() = default;
+    virtual const BtfShape& shape() const = 0;
+    virtual const Report& report() const = 0;
+    virtual Btf pictures(const OnView& on_view) = 0;
+};
+
 class GlossyBtf {
   public:
     // All but the pictures: the light of as many random runs as the accuracy needs, judged by a few views.
-    // The references must outlive it. Throws Error: for mirrors, and for cameras over curved bases; limit;
+    // environment: as of measure_btf; then all pictures are made at once. The references must outlive it.
+    // Throws Error: for mirrors, for cameras over curved bases, and for an environment on one; limit;
     // cancelled.
     GlossyBtf(const HeightField& surface, const Material& material, const BtfPlan& plan,
-              const RunOptions& options, const Monitor& monitor);
-    ~GlossyBtf();
+              const RunOptions& options, const Monitor& monitor, const Environment* environment = nullptr);
 
-    const BtfShape& shape() const;
-    const Report& report() const;
+    const BtfShape& shape() const { return pictures_->shape(); }
+    const Report& report() const { return pictures_->report(); }
 
     // Calls on_view for one view after the other with images [light][channel][pixel], halves as in
     // expand_view. Returns `mean` and `pixel_se`, the latter over the pixels of all views; radiance and
     // view_maps stay empty.
-    Btf pictures(const std::function<void(int view, std::span<const uint16_t> images)>& on_view);
+    Btf pictures(const GlossyPictures::OnView& on_view) { return pictures_->pictures(on_view); }
 
   private:
-    class Measurement;
-    std::unique_ptr<Measurement> measurement_;
+    std::unique_ptr<GlossyPictures> pictures_;
 };
 
 // As predict_btf, which asks it for whatever is not Lambertian.

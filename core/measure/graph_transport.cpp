@@ -17,12 +17,6 @@ namespace {
 
 constexpr int least_directions = 16;
 
-// From order 3 on the same directions are used more than once, and E[R R] is not E[R] E[R]: what that shifts
-// the indirect part by, over the scatter of single runs. 0.06 to 0.14 for GGX 0.15, 0.3 and a mixture on
-// three reliefs at 16 to 256 directions, 12 to 60 tables each against longer runs on parts of a quarter of
-// the width.
-constexpr double shared_directions_doubt = 0.12;
-
 // That shift, relative to the table as e.random is.
 double shared_directions_bias(const Stage& stage, const Estimate& e) {
     return shared_directions_doubt * std::sqrt(static_cast<double>(stage.f.count())) *

@@ -14,7 +14,8 @@ namespace gonio {
 
 struct RelightPlan {
     std::vector<AnglesDeg> outgoing;
-    int azimuths = 16;               // of the horizon slices, >= 3
+    // >= 3: of the horizon slices of Lambertian facets; glossy ones look at azimuths^2 directions a run.
+    int azimuths = 16;
     int pixels_x = 0, pixels_y = 0;  // over the measured rectangle; 0: one a cell
     // Where a view ray belongs to a pixel: at the highest point of the relief, or at height 0 as it was
     // given.
@@ -25,11 +26,13 @@ struct RelightPlan {
 
 struct Relit {
     int n_channels = 0, n_views = 0, pixels_x = 0, pixels_y = 0;
-    // Exit radiance of every facet part, [channel][facet_index() of visibility/view_map.h].
+    // Exit radiance of every facet part, [channel][facet_index() of visibility/view_map.h]; of glossy ones
+    // towards every view, [channel][view][facet], 0 where it faces away.
     size_t n_facets = 0;
     std::vector<float> radiance;
-    std::vector<double> radiance_se;  // [channel]: standard error of one facet's, rms over the relief's area
-    std::vector<float> images;        // [view][channel][row][column], row 0 at low y
+    std::vector<double>
+        radiance_se;  // [channel]: standard error of one facet's, rms over the relief's area (and the views)
+    std::vector<float> images;  // [view][channel][row][column], row 0 at low y
     // Radiance averaged over the surface as each view sees it, [channel][view]; standard error of the random
     // runs; bias: orders left out, and irradiance that is constant over a facet part.
     std::vector<double> mean, se, bias;
@@ -40,7 +43,7 @@ struct RelightResult {
     Report report;
 };
 
-// Throws Error: for materials that are not Lambertian; for RGB light on a spectrum; limit; cancelled.
+// Throws Error: for mirrors; for curved bases; for RGB light on a spectrum; limit; cancelled.
 RelightResult measure_relight(const HeightField& surface, const Material& material,
                               const Environment& environment, const RelightPlan& plan,
                               const RunOptions& options, const Monitor& monitor = {});

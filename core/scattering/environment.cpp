@@ -133,4 +133,68 @@ double horizontal_irradiance(const Environment& e, int channel) {
     return sum;
 }
 
+Environment with_unit_irradiance(const Environment& environment) {
+    Environment e = environment;
+    const size_t plane = static_cast<size_t>(e.nx) * e.ny;
+    for (int c = 0; c < e.n_channels; ++c)
+        if (const double irradiance = horizontal_irradiance(environment, c); irradiance > 0)
+            for (size_t k = 0; k < plane; ++k)
+                e.radiance[c * plane + k] = static_cast<float>(e.radiance[c * plane + k] / irradiance);
+    return e;
+}
+
+EnvironmentSamples sample_environment(const Environment& e, int n, double shift_row, double shift_column) {
+    const auto height = [&](int row) { return std::max(0.0, std::cos(pi * row / e.ny)); };
+    const int n_rows = (e.ny + 1) / 2;
+    // Per steradian, 1 on average over the hemisphere: each channel counts alike.
+    std::vector<double> density(static_cast<size_t>(n_rows) * e.nx, 0.0);
+    int bright = 0;
+    for (int c = 0; c < e.n_channels; ++c) {
+        double mean = 0;
+        for (int j = 0; j < n_rows; ++j)
+            for (int i = 0; i < e.nx; ++i) mean += e.texel(c, j, i) * (height(j) - height(j + 1)) / e.nx;
+        if (!(mean > 0)) continue;
+        ++bright;
+        for (size_t k = 0; k < density.size(); ++k)
+            density[k] += e.radiance[static_cast<size_t>(c) * e.nx * e.ny + k] / mean;
+    }
+    for (double& d : density) d = bright > 0 ? 0.5 + 0.5 * d / bright : 1.0;
+    // Shares of the rows, and inside each of its columns.
+    std::vector<double> row_ends, column_ends(density.size());
+    double total = 0;
+    for (int j = 0; j < n_rows; ++j) {
+        double row = 0;
+        for (int i = 0; i < e.nx; ++i) {
+            row += density[static_cast<size_t>(j) * e.nx + i];
+            column_ends[static_cast<size_t>(j) * e.nx + i] = row;
+        }
+        total += row * (height(j) - height(j + 1));
+        row_ends.push_back(total);
+    }
+    EnvironmentSamples samples;
+    samples.light.resize(e.n_channels);
+    const double golden = (std::sqrt(5.0) - 1) / 2;
+    for (int k = 0; k < n; ++k) {
+        const double at = total * (k + shift_row) / n;
+        const int j = static_cast<int>(std::min<long>(
+            std::upper_bound(row_ends.begin(), row_ends.end(), at) - row_ends.begin(), n_rows - 1));
+        const double before = j > 0 ? row_ends[j - 1] : 0.0,
+                     down = std::clamp((at - before) / (row_ends[j] - before), 0.0, 1.0);
+        const auto columns = column_ends.begin() + static_cast<long>(j) * e.nx;
+        const double turn = k * golden + shift_column, across = (turn - std::floor(turn)) * columns[e.nx - 1];
+        const int i = static_cast<int>(
+            std::min<long>(std::upper_bound(columns, columns + e.nx, across) - columns, e.nx - 1));
+        const double d = density[static_cast<size_t>(j) * e.nx + i],
+                     left = std::clamp(1 - (columns[i] - across) / d, 0.0, 1.0);
+        const double z = std::max(1e-4,
+                                  height(j) + down * (height(j + 1) - height(j))),  // as slab_directions
+            r = safe_sqrt(1 - z * z), phi = e.rotation + pi * (1 - 2 * (i + left) / e.nx);
+        samples.directions.push_back({r * std::cos(phi), r * std::sin(phi), z});
+        const double solid_angle = 2 * pi * total / e.nx / (n * d);
+        for (int c = 0; c < e.n_channels; ++c)
+            samples.light[c].push_back(static_cast<float>(solid_angle * e.texel(c, j, i)));
+    }
+    return samples;
+}
+
 }  // namespace gonio

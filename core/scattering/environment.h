@@ -46,5 +46,17 @@ Environment for_channels(const Environment& environment, int n_channels);
 
 // Irradiance of a horizontal plane.
 double horizontal_irradiance(const Environment& environment, int channel);
+// Every channel over that: dark ones stay dark.
+Environment with_unit_irradiance(const Environment& environment);
+
+// Directions that all facets share (dependent tests), for facets that look at the environment one direction
+// at a time: half of them as dense as it is bright, half alike over the upper hemisphere.
+struct EnvironmentSamples {
+    std::vector<Vec3> directions;
+    std::vector<std::vector<float>> light;  // [channel]: radiance times the solid angle of the direction
+};
+// A lattice of n directions, stratified over the rows; shifts in [0, 1) randomise it.
+EnvironmentSamples sample_environment(const Environment& environment, int n, double shift_row,
+                                      double shift_column);
 
 }  // namespace gonio

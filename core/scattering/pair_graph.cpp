@@ -48,8 +48,9 @@ class Sweep {
 
     size_t size() const { return graph_.size() * columns_; }
 
-    // R_1.
-    void first_order(HugeFloats& radiance) const {
+    FirstOrder first_order() const {
+        FirstOrder first;
+        HugeFloats& radiance = first.radiance;
         radiance.resize(size());
         for_chunks([&](size_t begin, size_t end) {
             PairBatch batch;
@@ -64,6 +65,8 @@ class Sweep {
                 turn_back(e, out, scratch);
             }
         });
+        first.arrived = arrived_directly();
+        return first;
     }
 
     // R_{k+1} from R_k, added to `total` if there is one.
@@ -225,11 +228,11 @@ void add_scaled(HugeFloats& to, const HugeFloats& from, float factor) {
 }
 
 // The light of all orders that arrives over the pairs; or of each of them at the views, if they are kept.
-HugeFloats sweep_orders(const Sweep& sweep, const GraphOptions& options, GraphOrders& result) {
-    HugeFloats radiance, next, total;
-    sweep.first_order(radiance);
+HugeFloats sweep_orders(const Sweep& sweep, FirstOrder first, const GraphOptions& options,
+                        GraphOrders& result) {
+    HugeFloats radiance = std::move(first.radiance), next, total;
     if (!options.keep_orders) total = radiance;
-    const double direct = sweep.arrived_directly();
+    const double direct = first.arrived;
     // Orders that are not wanted one by one go on for ever as the last two do: alike for all lights and views
     // by then, but for a fifth.
     constexpr double doubt_of_tail = 0.2;
@@ -265,7 +268,7 @@ GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotM
                            int n_threads, const Monitor& monitor) {
     const Sweep sweep(graph, tile, material, lights, views, n_threads, monitor);
     GraphOrders result;
-    const HugeFloats total = sweep_orders(sweep, options, result);
+    const HugeFloats total = sweep_orders(sweep, sweep.first_order(), options, result);
     if (!options.keep_orders) result.orders.push_back(sweep.received(total));
     return result;
 }
@@ -273,8 +276,8 @@ GraphOrders scatter_orders(const PairGraph& graph, const Tile& tile, const SlotM
 HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
                           const GraphSide& lights, const GraphOptions& options, int n_threads,
                           const Monitor& monitor, GraphOrders& series) {
-    HugeFloats all =
-        sweep_orders(Sweep(graph, tile, material, lights, lights, n_threads, monitor), options, series);
+    const Sweep sweep(graph, tile, material, lights, lights, n_threads, monitor);
+    HugeFloats all = sweep_orders(sweep, sweep.first_order(), options, series);
     if (!lights.nodes) return all;
     const size_t n = lights.n_lights(), padded = (n + 15) / 16 * 16, columns = lights.directions.padded();
     HugeFloats wanted(graph.size() * padded);
@@ -291,6 +294,14 @@ double rms_turn(const PairGraph& graph) {
         sum += static_cast<double>(bend.turn.about[0]) * bend.turn.about[0] +
                static_cast<double>(bend.turn.about[1]) * bend.turn.about[1];
     return graph.bends.empty() ? 0 : std::sqrt(sum / static_cast<double>(graph.bends.size()));
+}
+
+HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                          FirstOrder first, size_t columns, const GraphOptions& options, int n_threads,
+                          const Monitor& monitor, GraphOrders& series) {
+    const GraphSide side{DirectionArrays(std::vector<Vec3>(columns))};  // only their number counts
+    return sweep_orders(Sweep(graph, tile, material, side, side, n_threads, monitor), std::move(first),
+                        options, series);
 }
 
 double scatter_bytes(double n_pairs, int n_lights, int n_views) {

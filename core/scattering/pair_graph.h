@@ -114,6 +114,17 @@ HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMa
                           const GraphSide& lights, const GraphOptions& options, int n_threads,
                           const Monitor& monitor, GraphOrders& series);
 
+// R_1, from wherever it comes: [pair][columns]; and the light that arrives on facets directly, sum over area
+// and columns of their irradiance, by which the orders beyond are judged.
+struct FirstOrder {
+    HugeFloats radiance;
+    double arrived = 0;
+};
+// columns: a multiple of 16.
+HugeFloats arriving_light(const PairGraph& graph, const Tile& tile, const SlotMaterial& material,
+                          FirstOrder first, size_t columns, const GraphOptions& options, int n_threads,
+                          const Monitor& monitor, GraphOrders& series);
+
 // Memory of scatter_orders beside the graph, bytes.
 double scatter_bytes(double n_pairs, int n_lights, int n_views);
 

@@ -73,10 +73,10 @@ ServiceProcess measurement_process(const MeasureKind& kind, const std::string& t
     process.prepare = [process](const json& document, Objects& objects) {
         return prepare(document, process, objects);
     };
-    if (kind.under_environment) {
+    if (kind.light != MeasureKind::Light::directions)
         process.inputs.insert(process.inputs.begin() + 3, "environment");
+    if (kind.light == MeasureKind::Light::environment)
         process.required.insert(process.required.begin() + 2, "environment");
-    }
     return process;
 }
 

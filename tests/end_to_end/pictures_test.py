@@ -100,6 +100,32 @@ class Pictures(unittest.TestCase):
             same = near["images"][camera] == far["images"][0]
             self.assertGreater(same.mean(), 0.99)
 
+    def test_light_field_under_an_environment(self):
+        for name, view in (("sky", {"outgoing": {"list_deg": [[0, 0], [50, 20]]}}), ("near", {"cameras": {"count": [2, 1], "width": "20 um", "height": "60 um"}})):
+            document = job({"kind": "light_field", "pixels": [24, 24], "pixel_samples": 4, **view}, 1, environment={"radiance": 3},
+                           accuracy={"samples": {"directions": 64, "replicates": 4}}, output=[{"format": form, "path": f"{name}.{form}"} for form in ("btf", "images", "png")])
+            self.run_job(document)
+            head, arrays = read(self.folder / f"{name}.btf")
+            self.assertAlmostEqual(head["irradiance"][0], 3 * np.pi, places=5)
+            self.assertNotIn("incident_deg", head)
+            # A white relief under a uniform sky is as bright as the sky.
+            self.assertEqual(arrays["mean"].shape, (1, 1, 2))
+            np.testing.assert_allclose(head["irradiance"][0] * arrays["mean"], 3, rtol=0.01)
+            self.gonio("expand", f"{name}.btf", "-o", "expanded")
+            self.assertEqual((self.folder / "expanded").read_bytes(), (self.folder / f"{name}.images").read_bytes())
+            self.assertTrue((self.folder / f"{name}.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertIn("/base", self.run_job({**document, "base": {"kappa_1": 10}}, code=3).stderr)
+        document["material"] = {"model": "ggx", "alpha": 0.4, "reflectance": 1}
+        self.run_job({**document, "output": [{"format": "images", "path": "glossy"}, {"format": "png", "path": "glossy.png"}]})
+        head, arrays = read(self.folder / "glossy")
+        self.assertEqual(arrays["images"].shape, (2, 1, 1, 24, 24))
+        self.run_job({**document, "measure": {"kind": "relight", "outgoing": {"list_deg": [[0, 0]]}}, "output": [{"format": "json", "path": "whole"}]})
+        whole = json.loads((self.folder / "whole").read_text())["mean"][0][0]
+        self.assertLess(whole, 3)  # single scattering on rough facets loses some of the light
+        # Cameras 20 um apart 60 um above see about what is seen from straight above.
+        np.testing.assert_allclose(head["irradiance"][0] * arrays["mean"], whole, rtol=0.03)
+        np.testing.assert_allclose(arrays["images"].astype(float).mean(axis=(2, 3, 4)).ravel(), arrays["mean"].ravel(), rtol=2e-3)
+
     def test_light_field_of_a_near_camera_has_perspective(self):
         # A plane of two albedos seen from the height of half its width: what is seen at a pixel of its own plane is that pixel.
         grid = [[0] * 32 for _ in range(32)]

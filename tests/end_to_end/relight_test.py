@@ -86,13 +86,29 @@ class Relight(unittest.TestCase):
         np.testing.assert_allclose(images[0][0, 0, :32].mean(), images[0][0, 0, 32:].mean(), rtol=0.02)
         np.testing.assert_allclose(images[0][0], 2 * images[0][1], rtol=0.01)
 
+    def test_glossy_facets_send_every_view_its_own(self):
+        glossy = {"model": "mixture", "parts": [{"weight": 0.5, "model": "lambertian", "albedo": 1}, {"weight": 0.5, "model": "ggx", "alpha": 0.3, "reflectance": 1}]}
+        self.run_job({"material": glossy, "output": [{"format": name, "path": f"g.{name}"} for name in ("csv", "exr", "png", "arrays", "npy")]})
+        with open(self.folder / "g.arrays", "rb") as file:
+            head = json.loads(file.readline())
+        self.assertEqual(head["transport"], "pair graph")
+        arrays = {a["name"]: np.memmap(self.folder / "g.arrays", a["dtype"], "r", a["offset"], tuple(a["shape"])) for a in head["arrays"]}
+        self.assertEqual(arrays["facet_radiance"].shape, (1, 2, 2 * 40 * 40))
+        np.testing.assert_array_equal(np.load(self.folder / "g.npy"), arrays["images"])
+        # Single scattering on rough facets loses some of the light of 2.
+        for row, image in zip(self.read_csv("g.csv"), arrays["images"]):
+            self.assertTrue(1.5 < float(row["radiance"]) < 2 + 4 * float(row["se"]), row)
+            np.testing.assert_allclose(image.mean(), float(row["radiance"]), rtol=0.03)
+        self.assertTrue(set(arrays["images"][1].ravel()) <= set(arrays["facet_radiance"][0, 1]))
+
     def test_refusals(self):
         self.assertIn("/environment", self.run_job({"environment": {"file": "none.hdr"}}, code=3) + "/environment")
         self.write_sky("odd.hdr", 5, 5, lambda i, j: (1, 1, 1, 128))
         self.assertIn('say which one it is with "layout"', self.run_job({"environment": {"file": "odd.hdr"}}, code=3))
         (self.folder / "noise.hdr").write_bytes(b"#?RADIANCE\n" + bytes(range(256)))
         self.assertIn("noise.hdr", self.run_job({"environment": {"file": "noise.hdr"}}, code=3))
-        self.assertIn("Lambertian", self.run_job({"material": {"model": "phong", "exponent": 5, "albedo": 0.5}}, code=3))
+        self.assertIn("mirror", self.run_job({"material": {"model": "mirror", "reflectance": 0.5}}, code=3))
+        self.assertIn("/base", self.run_job({"base": {"kappa_1": 10}}, code=3))
         self.assertEqual(sorted(p.name for p in self.folder.iterdir()), ["job.json", "noise.hdr", "odd.hdr"])
 
 

@@ -123,6 +123,7 @@ describe("submitting", () => {
             ["projection", "brdf", ["incident"], { incident: angles, max_order: "all", project: { basis: "hsh", order: 4 } }],
             ["btf", "btf", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all", pixels: [12, 12] }],
             ["light_field", "light_field", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all" }],
+            ["environment_field", "light_field", ["outgoing"], { outgoing: angles, max_order: "all", azimuths: 16 }],
             ["maps", "maps", ["incident", "outgoing"], { incident: angles, outgoing: angles, max_order: "all", sky_directions: 32 }],
             ["relight", "relight", ["outgoing"], { outgoing: angles, max_order: "all", azimuths: 16 }]];
         for (const [choice, process, directions, measured] of kinds) {
@@ -137,7 +138,7 @@ describe("submitting", () => {
             await measure(page).click();
             const inputs = await sent;
             assert.deepEqual(inputs.measure, { kind: process, ...measured });
-            assert.deepEqual(inputs.environment, choice === "relight" ? { radiance: 1 } : undefined);
+            assert.deepEqual(inputs.environment, ["relight", "environment_field"].includes(choice) ? { radiance: 1 } : undefined);
             if (choice === "projection") await page.getByRole("region", { name: "Sphere", exact: true }).waitFor();
             else await page.getByRole("img", { name: `Picture of ${process.replaceAll("_", " ")}` }).waitFor();
         }

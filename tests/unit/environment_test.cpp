@@ -349,5 +349,81 @@ TEST(SkyIrradiance, OfCutRowsAndFineWaves) {
     }
 }
 
+// ---- directions for facets that look at one at a time ----
+
+// Mean over shifts of sum of light * weight(direction), and its standard error.
+template <class Weight>
+std::pair<double, double> integral(const Environment& e, int n, Weight&& weight) {
+    constexpr int shifts = 64;
+    double sum = 0, squares = 0;
+    for (int k = 0; k < shifts; ++k) {
+        const EnvironmentSamples samples =
+            sample_environment(e, n, (k + 0.5) / shifts, std::fmod(0.37 + k * 0.7548776662, 1.0));
+        double one = 0;
+        for (int i = 0; i < n; ++i) one += samples.light[0][i] * weight(samples.directions[i]);
+        sum += one, squares += one * one;
+    }
+    const double mean = sum / shifts;
+    return {mean, std::sqrt(std::max(0.0, squares / shifts - mean * mean) / (shifts - 1))};
+}
+
+TEST(EnvironmentSamples, SumUpToTheLightAbove) {
+    Environment odd;  // a row of it lies across the horizon
+    odd.nx = 12, odd.ny = 7, odd.n_channels = 1, odd.rotation = 0.7;
+    for (int k = 0; k < 84; ++k) odd.radiance.push_back(static_cast<float>(k % 5 * (k % 3)));
+    Environment sun = uniform_environment({0.1});
+    sun.nx = 90, sun.ny = 45;
+    sun.radiance.assign(90 * 45, 0.1f);
+    sun.radiance[10 * 90 + 33] = 5000;
+    for (const Environment& e : {odd, sun, uniform_environment({2})}) {
+        const auto [irradiance, se] = integral(e, 64, [](const Vec3& d) { return d.z; });
+        EXPECT_NEAR(irradiance, horizontal_irradiance(e, 0), 4 * se + 1e-5 * irradiance);
+        EXPECT_LT(se, 0.02 * irradiance);
+    }
+    // Of a side, too: azimuths and rotation.
+    const Vec3 side = to_vector({60, 130});
+    const auto [seen, se] =
+        integral(odd, 64, [&](const Vec3& d) { return std::pow(std::max(0.0, dot(d, side)), 3); });
+    double expected = 0;
+    constexpr int n = 800;
+    for (int j = 0; j < n; ++j)
+        for (int i = 0; i < 4 * n; ++i) {
+            const double z = (j + 0.5) / n, r = std::sqrt(1 - z * z), turn = (i + 0.5) / (4 * n),
+                         phi = odd.rotation + pi * (1 - 2 * turn);
+            const int row = static_cast<int>(std::acos(z) / pi * 7), column = static_cast<int>(turn * 12);
+            const Vec3 d{r * std::cos(phi), r * std::sin(phi), z};
+            expected += odd.texel(0, row, column) * std::pow(std::max(0.0, dot(d, side)), 3);
+        }
+    expected *= 2 * pi / (4.0 * n * n);
+    EXPECT_NEAR(seen, expected, 4 * se + 2e-3 * expected);
+    EXPECT_LT(se, 0.02 * expected);
+}
+
+TEST(EnvironmentSamples, GoWhereItIsBright) {
+    Environment sun = uniform_environment({0});
+    sun.radiance[5] = 10;
+    sun.n_channels = 3;
+    sun.radiance.resize(96);
+    const EnvironmentSamples samples = sample_environment(sun, 100, 0.3, 0.2);
+    ASSERT_EQ(samples.light.size(), 3u);
+    int lit = 0;
+    for (int k = 0; k < 100; ++k) {
+        EXPECT_NEAR(dot(samples.directions[k], samples.directions[k]), 1, 1e-12);
+        EXPECT_GE(samples.directions[k].z, 1e-4);
+        EXPECT_EQ(samples.light[1][k], 0);
+        lit += samples.light[0][k] > 0;
+    }
+    EXPECT_GT(lit, 45);  // half, and a share of the others
+    EXPECT_LT(lit, 65);
+}
+
+TEST(EnvironmentOfUnitIrradiance, LeavesTheDarkDark) {
+    Environment e = uniform_environment({3, 0, 1e30});
+    const Environment one = with_unit_irradiance(e);
+    EXPECT_NEAR(horizontal_irradiance(one, 0), 1, 1e-5);
+    EXPECT_EQ(horizontal_irradiance(one, 1), 0);
+    EXPECT_NEAR(horizontal_irradiance(one, 2), 1, 1e-5);
+}
+
 }  // namespace
 }  // namespace gonio

@@ -1,0 +1,115 @@
+#include <cmath>
+
+#include "base/parallel.h"
+#include "measure/accuracy.h"
+#include "measure/glossy_sky.h"
+#include "measure/relit_runs.h"
+
+namespace gonio {
+namespace {
+
+class GlossyRelitRuns final : public RelitRuns {
+  public:
+    GlossyRelitRuns(const HeightField& surface, const Material& material, const Environment& environment,
+                    const RelightPlan& plan, const Accuracy::Samples& samples, const RunOptions& options,
+                    const Monitor& monitor)
+        : options_(options),
+          monitor_(monitor),
+          sky_(surface, material, environment, plan.azimuths, plan.max_order, samples, plan.accuracy.seed,
+               options, monitor) {
+        for (const AnglesDeg& view : plan.outgoing) views_.push_back(to_vector(view));
+    }
+
+    const MarchGrid& grid() const override { return sky_.grid(); }
+    const Tile& tile() const override { return sky_.tile(); }
+    int layers() const override { return static_cast<int>(views_.size()); }
+    double remainder() const override { return sky_.remainder(); }
+
+    // From order 3 on the shared directions are used more than once (see shared_directions_doubt).
+    std::vector<double> doubts() const override {
+        std::vector<double> doubts;
+        const size_t n_views = views_.size();
+        for (size_t c = 0; c < sky_.n_channels(); ++c)
+            for (const double se : standard_errors(indirect_, c * n_views, view_groups(layers())))
+                doubts.push_back(shared_directions_doubt * std::sqrt(indirect_.count()) * se);
+        return doubts;
+    }
+
+    // Place by place, for inside a facet what is lit and what is seen are correlated; the orders beyond the
+    // first leave it evenly.
+    RelitRun run(int run) override {
+        sky_.start_run(run);
+        const size_t n = sky_.tile().n_unknowns(), n_views = views_.size();
+        const Receivers every_part{n * n_views, [&](size_t first, size_t count, SeenParts& out) {
+                                       for (size_t k = 0; k < count; ++k)
+                                           out.set(k, (first + k) % n, views_[(first + k) / n]);
+                                   }};
+        RelitRun result;
+        result.radiance.assign(sky_.n_channels(), std::vector<float>(every_part.count, 0.0f));
+        VisibleCosines seen;
+        std::vector<double> sent(sky_.n_channels() * n_views, 0.0);
+        const double share = 1.0 / static_cast<double>(sky_.places().size());
+        for (const SubSample& place : sky_.places()) {
+            const VisibilityBits bits = find_visibility(sky_.grid(), sky_.tile(), views_, {place},
+                                                        options_.allow_skips, options_.n_threads, monitor_);
+            VisibleCosines here;
+            add_cosines(sky_.tile(), views_, bits, 1.0, options_.n_threads, here);
+            add_cosines(sky_.tile(), views_, bits, share, options_.n_threads, seen);
+            const Radiances direct = sky_.direct(place, every_part);
+            add_sent(direct, here, share, sent);
+            for (size_t c = 0; c < direct.size(); ++c)
+                for (size_t k = 0; k < direct[c].size(); ++k)
+                    result.radiance[c][k] += static_cast<float>(share) * direct[c][k];
+        }
+        const Radiances indirect = sky_.indirect(every_part);
+        std::vector<double> sent_indirectly(sent.size(), 0.0);
+        add_sent(indirect, seen, 1.0, sent_indirectly);
+        for (size_t c = 0; c < indirect.size(); ++c)
+            for (size_t k = 0; k < indirect[c].size(); ++k) result.radiance[c][k] += indirect[c][k];
+        const std::vector<double> projected = projected_areas(sky_.tile(), seen, static_cast<int>(n_views));
+        std::vector<float> means_indirect;
+        for (size_t k = 0; k < sent.size(); ++k) {
+            const double area = projected[k % n_views];
+            result.means.push_back(area > 0 ? static_cast<float>((sent[k] + sent_indirectly[k]) / area)
+                                            : 0.0f);
+            means_indirect.push_back(area > 0 ? static_cast<float>(sent_indirectly[k] / area) : 0.0f);
+        }
+        indirect_.add(means_indirect);
+        return result;
+    }
+
+    void describe(int runs, Report& report) const override { sky_.describe(runs, report); }
+
+  private:
+    // sent[channel][view] += share * sum of area cosine radiance.
+    void add_sent(const Radiances& radiances, const VisibleCosines& seen, double share,
+                  std::vector<double>& sent) const {
+        const Tile& tile = sky_.tile();
+        const std::vector<float> area = core_areas(tile);
+        parallel_for(static_cast<int>(sent.size()), options_.n_threads, [&](int k) {
+            const size_t v = k % views_.size();
+            const float* radiance = &radiances[k / views_.size()][v * tile.n_unknowns()];
+            double sum = 0;
+            for (size_t u = 0; u < tile.n_unknowns(); ++u)
+                sum += static_cast<double>(area[u % tile.n_slots()]) * seen.of(u)[v] * radiance[u];
+            sent[k] += share * sum;
+        });
+    }
+
+    const RunOptions& options_;
+    const Monitor& monitor_;
+    GlossySky sky_;
+    std::vector<Vec3> views_;
+    Moments indirect_;  // what orders 2 and up add to the means, [channel][view]
+};
+
+}  // namespace
+
+std::unique_ptr<RelitRuns> glossy_relit_runs(const HeightField& surface, const Material& material,
+                                             const Environment& environment, const RelightPlan& plan,
+                                             const Accuracy::Samples& samples, const RunOptions& options,
+                                             const Monitor& monitor) {
+    return std::make_unique<GlossyRelitRuns>(surface, material, environment, plan, samples, options, monitor);
+}
+
+}  // namespace gonio
