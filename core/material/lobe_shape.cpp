@@ -67,6 +67,12 @@ std::vector<LobeShape> lobe_shapes(const Material& material) {
     return shapes;
 }
 
+double reflected_share(const Material& material) {
+    double sum = 0;
+    for (const LobeShape& shape : lobe_shapes(material)) sum += shape.share;
+    return sum;
+}
+
 double highest_peak(const Material& material) {
     double peak = 0;
     for (const LobeShape& shape : lobe_shapes(material))

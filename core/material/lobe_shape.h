@@ -17,6 +17,9 @@ struct LobeShape {
 // One a lobe, or two for a coat (its reflection and its base).
 std::vector<LobeShape> lobe_shapes(const Material& material);
 
+// All of their shares together.
+double reflected_share(const Material& material);
+
 // Largest f cos of light along the normal, in 1/sr; infinite for a mirror that reflects at all.
 double highest_peak(const Material& material);
 

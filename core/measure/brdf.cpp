@@ -1,11 +1,9 @@
 #include "measure/brdf.h"
 
-#include <algorithm>
-#include <map>
-
+#include "measure/brdf_scene.h"
 #include "measure/describe.h"
 #include "measure/measurement.h"
-#include "measure/simplify.h"
+#include "measure/transport_choice.h"
 #include "visibility/curvature.h"
 
 namespace gonio {
@@ -36,32 +34,6 @@ MarchGrid checked_march_grid(const HeightField& s, long long max_bytes) {
     return make_march_grid(s);
 }
 
-// views[v] == lights[view_to_light[v]], if the two sets are equal; else empty.
-std::vector<int> match_views(const BrdfPlan& plan) {
-    if (plan.incident.size() != plan.outgoing.size()) return {};
-    std::map<std::pair<double, double>, int> light_of;
-    for (size_t l = 0; l < plan.incident.size(); ++l)
-        light_of[{plan.incident[l].theta_deg, plan.incident[l].phi_deg}] = static_cast<int>(l);
-    std::vector<int> found;
-    for (const AnglesDeg& v : plan.outgoing) {
-        const auto at = light_of.find({v.theta_deg, v.phi_deg});
-        if (at == light_of.end()) return {};
-        found.push_back(at->second);
-    }
-    if (light_of.size() != found.size()) return {};
-    return found;
-}
-
-std::vector<Vec3> vectors_of(const std::vector<AnglesDeg>& angles, bool axes_swapped) {
-    std::vector<Vec3> list;
-    for (const AnglesDeg& a : angles) {
-        Vec3 d = to_vector(a);
-        if (axes_swapped) std::swap(d.x, d.y);
-        list.push_back(d);
-    }
-    return list;
-}
-
 BrdfResult empty_result(const Material& material, const BrdfPlan& plan) {
     BrdfResult result;
     result.table.incident = plan.incident;
@@ -70,17 +42,6 @@ BrdfResult empty_result(const Material& material, const BrdfPlan& plan) {
     result.table.cells = plan.outgoing_cells;
     result.table.channels = material.channels;
     return result;
-}
-
-RowGroups row_groups(const Table& table) {
-    RowGroups groups;
-    for (size_t r = 0; r < table.rows(); ++r) {
-        groups.light.push_back(table.pair(r).first);
-        groups.view.push_back(table.pair(r).second);
-    }
-    groups.n_lights = static_cast<int>(table.incident.size());
-    groups.n_views = static_cast<int>(table.outgoing.size());
-    return groups;
 }
 
 }  // namespace
@@ -94,14 +55,8 @@ BrdfResult measure_brdf(const HeightField& surface, const Material& material, co
                     "needs at least one incident and one outgoing direction");
     BrdfResult result = empty_result(material, plan);
     Report& report = result.report;
-    // Of Lambertian facets, whatever they were written as, an albedo for each channel.
     const Lambertian* lambertian = pure_lambertian(material);
-    const SimplifiedScene simple = simplify_scene(
-        surface,
-        lambertian ? Material(material.channels,
-                              Lambertian{lambertian->albedo.for_channels(material.channels.size())})
-                   : material,
-        options.allow_skips);
+    const SimplifiedScene simple = simplify_brdf_scene(surface, material, options.allow_skips);
     report.skipped = simple.skipped;
     if (options.allow_skips && is_plane(simple.surface) && !has_maps(simple.material) && lambertian) {
         report.skipped.push_back({"all tracing", "the surface is a plane: f = albedo / pi exactly"});
@@ -114,23 +69,14 @@ BrdfResult measure_brdf(const HeightField& surface, const Material& material, co
             plan, [](size_t, size_t) { return 0.0; }, result);
     } else {
         const MarchGrid grid = checked_march_grid(simple.surface, options.max_bytes);
-        MeasuredScene scene;
-        scene.surface = &simple.surface;
-        scene.grid = &grid;
-        scene.material = &simple.material;
-        scene.plan = &plan;
-        scene.lights = vectors_of(plan.incident, simple.axes_swapped);
-        scene.views = vectors_of(plan.outgoing, simple.axes_swapped);
-        scene.groups = row_groups(result.table);
-        scene.axes_swapped = simple.axes_swapped;
-        scene.allow_skips = options.allow_skips;
-        // Two runs fit side by side. A share by threads would cut a job differently on other machines.
-        scene.max_bytes = static_cast<long long>(0.4 * static_cast<double>(options.max_bytes));
-        if (options.allow_skips && plan.outgoing_cells.empty()) scene.view_to_light = match_views(plan);
+        const MeasuredScene scene = brdf_scene(simple, grid, plan, options);
         if (!scene.view_to_light.empty())
             report.skipped.push_back({"half of the directions", "lights and views are the same set"});
-        const std::unique_ptr<Transport> transport = make_transport(scene, report);
-        measure_by_runs(scene, *transport, options, monitor, result);
+        TransportChoice choice = choose_transport(scene);
+        report.settings = choice.report.settings;
+        report.skipped.insert(report.skipped.end(), choice.report.skipped.begin(),
+                              choice.report.skipped.end());
+        measure_by_runs(scene, *choice.transport, options, monitor, result);
     }
     for (const auto& [key, value] : report.settings) result.table.provenance.push_back({key, value});
     return result;

@@ -8,6 +8,12 @@ int directions_per_cell(const RunSettings& settings) {
     return std::min(4 * settings.sub_samples, 64);
 }
 
+RunSettings settings_of_place(const RunSettings& settings) {
+    RunSettings at_place = settings;
+    at_place.sub_samples = std::max(1, 4 * settings.sub_samples / directions_per_cell(settings));
+    return at_place;
+}
+
 int views_of_run(const MeasuredScene& scene, const RunSettings& settings) {
     return static_cast<int>(scene.views.size()) *
            (scene.plan->outgoing_cells.empty() ? 1 : directions_per_cell(settings));

@@ -80,9 +80,10 @@ double DiffuseTransport::wanted_bytes(const RunSettings& settings) const {
 
 RunValues DiffuseTransport::run(const RunSettings& settings, int stage, int run, int n_threads,
                                 const Monitor& monitor) const {
-    return run_with_cells(context_, settings, stage, run, [&](const RunContext& context) {
-        return run_once(context, settings, stage, run, n_threads, monitor);
-    });
+    return run_with_cells(context_, settings, stage, run,
+                          [&](const RunContext& context, const RunSettings& at_place) {
+                              return run_once(context, at_place, stage, run, n_threads, monitor);
+                          });
 }
 
 std::string DiffuseTransport::settings_key(const RunSettings& settings) const {
@@ -159,6 +160,10 @@ Estimate DiffuseTransport::estimate(const std::vector<Stage>& stages) const {
 
 NextStep DiffuseTransport::next_step(const Stage& stage, const Estimate& estimate, double target) const {
     return gonio::next_step(context_, stage, estimate, target);
+}
+
+RunForecast DiffuseTransport::forecast(const RunSettings& settings) const {
+    return forecast_diffuse(context_, settings);
 }
 
 double DiffuseTransport::relative_cost(const RunSettings& settings, const RunSettings& reference) const {

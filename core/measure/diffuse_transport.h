@@ -24,6 +24,7 @@ class DiffuseTransport : public Transport {
     void find_bias(const std::vector<Stage>& stages, const SideWork& side, Report& report) override;
     Estimate estimate(const std::vector<Stage>& stages) const override;
     NextStep next_step(const Stage& stage, const Estimate& estimate, double target) const override;
+    RunForecast forecast(const RunSettings& settings) const override;
     double relative_cost(const RunSettings& settings, const RunSettings& reference) const override;
     void describe(const std::vector<Stage>& stages, const RunValues& totals, Report& report) const override;
 

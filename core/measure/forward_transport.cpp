@@ -45,9 +45,7 @@ void add_doubt_of_one_ray(const double* f, const std::vector<double>& projected_
 }  // namespace
 
 ForwardTransport::ForwardTransport(const MeasuredScene& scene)
-    : scene_(scene),
-      forward_(*scene.surface, *scene.grid, *scene.material, scene.plan->outgoing_cells, scene.axes_swapped),
-      single_orders_(scene.plan->separate_orders ? scene.plan->max_order : 0) {
+    : scene_(scene), single_orders_(scene.plan->separate_orders ? scene.plan->max_order : 0) {
     for (const ReceiverCell& cell : scene.plan->outgoing_cells)
         projected_sr_.push_back(projected_solid_angle(cell));
 }
@@ -94,7 +92,7 @@ RunValues ForwardTransport::run(const RunSettings& settings, int stage, int run,
         forward.first_block = static_cast<int>(words[2] % static_cast<uint32_t>(settings.block_step));
         forward.max_order = scene_.plan->max_order;
         forward.skip_steep = scene_.allow_skips;
-        tallies[l] = trace_light(forward_, scene_.lights[l], forward, seed, stream, l, monitor);
+        tallies[l] = trace_light(*forward_, scene_.lights[l], forward, seed, stream, l, monitor);
     });
 
     RunValues values;
@@ -140,6 +138,12 @@ std::string ForwardTransport::settings_key(const RunSettings& settings) const {
 
 void ForwardTransport::fix_orders(const RunValues& first) {
     if (single_orders_ == 0) single_orders_ = first.higher_orders + 1;
+}
+
+void ForwardTransport::begin_stage(const Stage& /*stage*/, int /*n_runs*/) {
+    if (!forward_)
+        forward_.emplace(*scene_.surface, *scene_.grid, *scene_.material, scene_.plan->outgoing_cells,
+                         scene_.axes_swapped);
 }
 
 Estimate ForwardTransport::estimate(const std::vector<Stage>& stages) const {
@@ -215,6 +219,10 @@ NextStep ForwardTransport::next_step(const Stage& stage, const Estimate& estimat
         step.possible = step.settings.sub_samples > stage.settings.sub_samples;
     }
     return step;
+}
+
+RunForecast ForwardTransport::forecast(const RunSettings& settings) const {
+    return forecast_forward(scene_, settings);
 }
 
 double ForwardTransport::relative_cost(const RunSettings& settings, const RunSettings& reference) const {

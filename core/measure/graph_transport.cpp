@@ -85,9 +85,10 @@ bool GraphTransport::fits(const RunSettings& settings) const {
 
 RunValues GraphTransport::run(const RunSettings& settings, int stage, int run, int n_threads,
                               const Monitor& monitor) const {
-    return run_with_cells(context_, settings, stage, run, [&](const GraphContext& context) {
-        return graph_run(context, settings, stage, run, n_threads, monitor);
-    });
+    return run_with_cells(context_, settings, stage, run,
+                          [&](const GraphContext& context, const RunSettings& at_place) {
+                              return graph_run(context, at_place, stage, run, n_threads, monitor);
+                          });
 }
 
 std::string GraphTransport::settings_key(const RunSettings& settings) const {
@@ -200,6 +201,10 @@ NextStep GraphTransport::next_step(const Stage& stage, const Estimate& e, double
     if (next == stage.settings && stage.f.count() < most_window_runs) step.more_runs = runs_at_first;
     step.possible = step.more_runs > 0 || !(next == stage.settings);
     return step;
+}
+
+RunForecast GraphTransport::forecast(const RunSettings& settings) const {
+    return forecast_graph(context_, settings);
 }
 
 double GraphTransport::relative_cost(const RunSettings& settings, const RunSettings& reference) const {

@@ -7,7 +7,6 @@
 #include "surface/facet_mesh.h"
 
 namespace gonio {
-namespace {
 
 double rms_slope(const HeightField& s) {
     const int step = std::max(1, s.ny / 128);
@@ -20,6 +19,8 @@ double rms_slope(const HeightField& s) {
         }
     return std::sqrt(sum / static_cast<double>(n));
 }
+
+namespace {
 
 double cells(const MeasuredScene& scene) {
     return static_cast<double>(scene.surface->nx) * scene.surface->ny;

@@ -10,6 +10,9 @@ namespace gonio {
 
 inline constexpr int runs_at_first = 6, most_runs = 16, most_window_runs = 32;
 
+// Of a sample of the facets.
+double rms_slope(const HeightField& surface);
+
 RunSettings first_settings(const RunContext& context, double target);
 
 // Cells that one run works on.

@@ -1,14 +1,14 @@
 // The one seam of light transport: a measurement asks it for independent randomised runs, refines what
 // dominates their error, and knows nothing of how light travels. One class a transport; the list is in
-// transport.cpp.
+// transport_choice.cpp.
 #pragma once
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/monitor.h"
 #include "measure/estimate.h"
+#include "measure/forecast.h"
 #include "measure/planning.h"
 #include "measure/report.h"
 #include "measure/run.h"
@@ -57,6 +57,7 @@ class Transport {
 
     virtual Estimate estimate(const std::vector<Stage>& stages) const = 0;
     virtual NextStep next_step(const Stage& stage, const Estimate& estimate, double target) const = 0;
+    virtual RunForecast forecast(const RunSettings& settings) const = 0;
     // Work of a run relative to another's.
     virtual double relative_cost(const RunSettings& settings, const RunSettings& reference) const = 0;
 
@@ -64,10 +65,5 @@ class Transport {
     virtual void describe(const std::vector<Stage>& stages, const RunValues& totals,
                           Report& report) const = 0;
 };
-
-// A transport of the scene (which must outlive it), chosen by plan.transport or, for `automatic`, by the
-// receivers and the material; which and why goes into report.settings. Throws Error(invalid_input,
-// "/measure/transport") for a forced one that cannot do this material.
-std::unique_ptr<Transport> make_transport(const MeasuredScene& scene, Report& report);
 
 }  // namespace gonio

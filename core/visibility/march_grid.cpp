@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "surface/facet_mesh.h"
+#include "visibility/march_bounds.h"
 
 namespace gonio {
 namespace {
@@ -92,16 +93,18 @@ double steepest_ray(const MarchGrid& grid, double slope) {
     return steepest;
 }
 
-}  // namespace
+std::vector<float> heights_in_cells(const HeightField& surface) {
+    std::vector<float> nodes(surface.heights.size());
+    for (size_t k = 0; k < nodes.size(); ++k)
+        nodes[k] = static_cast<float>(static_cast<double>(surface.heights[k]) / surface.pitch_x);
+    return nodes;
+}
 
-MarchGrid make_march_grid(const HeightField& surface) {
+MarchGrid bounds(const HeightField& surface, const std::vector<float>& nodes) {
     MarchGrid grid;
     grid.pitch_x = surface.pitch_x;
     grid.pitch_y = surface.pitch_y;
     const int nx = surface.nx, ny = surface.ny;
-    std::vector<float> nodes(surface.heights.size());
-    for (size_t k = 0; k < nodes.size(); ++k)
-        nodes[k] = static_cast<float>(static_cast<double>(surface.heights[k]) / surface.pitch_x);
     const auto [low, high] = std::minmax_element(nodes.begin(), nodes.end());
     grid.lowest = *low;
     grid.highest = *high;
@@ -123,7 +126,19 @@ MarchGrid make_march_grid(const HeightField& surface) {
     }
     grid.base = surface.base;
     grid.max_slope = steepest_ray(grid, std::sqrt(steepest_squared));
+    return grid;
+}
 
+}  // namespace
+
+MarchGrid march_bounds(const HeightField& surface) {
+    return bounds(surface, heights_in_cells(surface));
+}
+
+MarchGrid make_march_grid(const HeightField& surface) {
+    const std::vector<float> nodes = heights_in_cells(surface);
+    const int nx = surface.nx, ny = surface.ny;
+    MarchGrid grid = bounds(surface, nodes);
     grid.rows = make_plane(nodes, nx, ny);
     if (ny >= march_block) {
         std::vector<float> turned(nodes.size());

@@ -30,6 +30,7 @@ BrdfPlan cell_plan(std::vector<ReceiverCell> cells, std::vector<AnglesDeg> incid
     plan.incident = std::move(incident);
     plan.outgoing = centres(cells);
     plan.outgoing_cells = std::move(cells);
+    plan.transport = TransportKind::forward;
     plan.accuracy.samples = Accuracy::Samples{sub_samples, 64, 1, runs};
     return plan;
 }

@@ -33,6 +33,7 @@ BrdfPlan cell_plan(int sub_samples = 2) {
     BrdfPlan plan = plan_of(lights, {}, Accuracy::Samples{sub_samples, 64, 1, 6});
     plan.outgoing_cells = equal_cells(16);
     plan.outgoing = centres(plan.outgoing_cells);
+    plan.transport = TransportKind::forward;
     return plan;
 }
 Table in_cells(const Material& material) {
