@@ -58,8 +58,9 @@ struct Coverage {
     }
 };
 
-nlohmann::json truth_of(const std::string& relief, const std::string& facets = "lambertian") {
-    return reference::load_json("../../agreement/data/" + honest::truth_file(relief, facets));
+nlohmann::json truth_of(const std::string& relief, const std::string& facets = "lambertian",
+                        honest::Receivers receivers = honest::Receivers::directions) {
+    return reference::load_json("../../agreement/data/" + honest::truth_file(relief, facets, receivers));
 }
 
 double error_of(const nlohmann::json& truth) {
@@ -67,16 +68,18 @@ double error_of(const nlohmann::json& truth) {
 }
 
 Coverage table_of(const honest::Relief& relief, double target, const std::string& facets = "lambertian",
-                  int seeds = n_seeds) {
+                  int seeds = n_seeds, const BrdfPlan& wanted = honest::plan()) {
     const HeightField surface = relief.make();
-    const nlohmann::json truth = truth_of(relief.name, facets);
+    const nlohmann::json truth =
+        truth_of(relief.name, facets,
+                 wanted.outgoing_cells.empty() ? honest::Receivers::directions : honest::Receivers::cells);
     EXPECT_EQ(truth.at("surface_hash"), surface_hash(surface));
     const std::vector<double> values = truth.at("f");
     const double mean =
         std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
     Coverage coverage;
     for (int seed = 1; seed <= seeds; ++seed) {
-        BrdfPlan plan = honest::plan();
+        BrdfPlan plan = wanted;
         plan.accuracy.target_relative_error = target;
         plan.accuracy.seed = seed;
         const Table table = measure(surface, honest::material(facets), plan).table;
@@ -178,6 +181,23 @@ TEST_P(HonestErrors, CoverTheTruthOfGlossyFacets) {
     expect_honest(parts, GetParam());
 }
 
+// Means over cells: by looking from places inside (measure/cell_views.h), and by counting what arrives.
+TEST(HonestCells, CoverTheTruth) {
+    constexpr double target = 0.02;
+    for (const bool forward : {false, true}) {
+        std::vector<std::pair<std::string, Coverage>> parts;
+        for (const auto& [relief, facets] : honest::in_cells) {
+            BrdfPlan plan = honest::cell_plan();
+            plan.transport = forward                               ? TransportKind::forward
+                             : facets == std::string("lambertian") ? TransportKind::diffuse
+                                                                   : TransportKind::pair_graph;
+            parts.emplace_back(std::string(relief) + " " + facets + (forward ? ", forward" : ""),
+                               table_of(honest::relief(relief), target, facets, 6, plan));
+        }
+        expect_honest(parts, target);
+    }
+}
+
 INSTANTIATE_TEST_SUITE_P(Targets, HonestErrors, testing::Values(0.01, 0.002));
 
 // The truth itself, judged by the path tracer when it was made: no more than its own noise apart, and no
@@ -186,6 +206,8 @@ TEST(HonestTruth, AgreesWithThePathTracer) {
     std::vector<nlohmann::json> truths;
     for (const honest::Relief& relief : honest::reliefs) truths.push_back(truth_of(relief.name));
     for (const auto& [relief, facets] : honest::glossy) truths.push_back(truth_of(relief, facets));
+    for (const auto& [relief, facets] : honest::in_cells)
+        truths.push_back(truth_of(relief, facets, honest::Receivers::cells));
     for (const nlohmann::json& truth : truths) {
         SCOPED_TRACE(truth.at("command").get<std::string>());
         const nlohmann::json& traced = truth.at("path_tracer");

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "directions/cells.h"
 #include "directions/gonio_grid.h"
 #include "measure/brdf.h"
 #include "surface/generate.h"
@@ -94,9 +95,17 @@ inline const std::vector<std::pair<const char*, const char*>> glossy{
     {"rough", "ggx_0.3"}, {"wavy", "ggx_0.15"},   {"hilly", "mixture"}, {"wavy", "brushed"},
     {"rough", "coated"},  {"egg_crate", "phong"}, {"dunes", "ggx_0.3"}};
 
+// The same for receiver cells.
+inline const std::vector<std::pair<const char*, const char*>> in_cells{
+    {"rough", "lambertian"}, {"hilly", "mixture"}, {"dunes", "ggx_0.3"}};
+
+enum class Receivers { directions, cells };
+
 // Where the truth of a relief with such facets is kept, without its ending.
-inline std::string truth_file(const std::string& relief, const std::string& facets_name = "lambertian") {
-    return "honest_" + relief + (facets_name == "lambertian" ? "" : "_" + facets_name);
+inline std::string truth_file(const std::string& relief, const std::string& facets_name = "lambertian",
+                              Receivers receivers = Receivers::directions) {
+    return "honest_" + relief + (facets_name == "lambertian" ? "" : "_" + facets_name) +
+           (receivers == Receivers::cells ? "_cells" : "");
 }
 
 // 16 lights over the hemisphere, 16 views to 80 degrees: no two directions alike, so no two values are.
@@ -104,6 +113,14 @@ inline BrdfPlan plan() {
     BrdfPlan plan;
     plan.incident = equal_projected_hemisphere(16);
     plan.outgoing = product_grid({15, 40, 65, 80}, {20, 110, 200, 290});
+    return plan;
+}
+
+// The same lights, 16 cells.
+inline BrdfPlan cell_plan() {
+    BrdfPlan plan = honest::plan();
+    plan.outgoing_cells = equal_cells(16);
+    plan.outgoing = centres(plan.outgoing_cells);
     return plan;
 }
 
