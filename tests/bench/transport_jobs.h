@@ -4,8 +4,10 @@
 #include <utility>
 #include <vector>
 
-#include "agreement/honest_surfaces.h"
 #include "directions/cells.h"
+#include "directions/gonio_grid.h"
+#include "measure/brdf.h"
+#include "surface/generate.h"
 
 namespace gonio::bench {
 
@@ -33,6 +35,13 @@ inline BrdfPlan to_target(BrdfPlan plan, double target) {
     plan.accuracy.target_relative_error = target;
     return plan;
 }
+// 16 lights, 16 views.
+inline BrdfPlan at_directions(double target) {
+    BrdfPlan plan;
+    plan.incident = equal_projected_hemisphere(16);
+    plan.outgoing = product_grid({15, 40, 65, 80}, {20, 110, 200, 290});
+    return to_target(std::move(plan), target);
+}
 // 16 lights.
 inline BrdfPlan into_cells(std::vector<ReceiverCell> cells, double target) {
     BrdfPlan plan;
@@ -50,7 +59,6 @@ HeightField gaussian() {
 
 inline std::vector<TransportJob> transport_jobs() {
     using enum TransportKind;
-    const auto at_16 = [](double target) { return to_target(honest::plan(), target); };
     const Material white({"y"}, Lambertian{0.8}), mirror({"y"}, Mirror{{1.0, {}, {}}}),
         beckmann({"y"}, Microfacet{Microfacet::Distribution::beckmann, 0.3, 0.3, 0.0, {1.0, {}, {}}}),
         coat({"y"}, CoatedDiffuse{1.5, 0.15, 0.8});
@@ -143,32 +151,37 @@ inline std::vector<TransportJob> transport_jobs() {
          false,
          gaussian<96, 60, 6>,
          ggx(0.1, 0.4),
-         at_16(0.01),
+         at_directions(0.01),
          {{pair_graph, 0.165}}},
         {"Beckmann 0.3, directions",
          false,
          gaussian<64, 80, 4>,
          beckmann,
-         at_16(0.008),
+         at_directions(0.008),
          {{pair_graph, 0.192}}},
-        {"coat 0.15, directions", false, gaussian<64, 80, 4>, coat, at_16(0.01), {{pair_graph, 0.299}}},
+        {"coat 0.15, directions",
+         false,
+         gaussian<64, 80, 4>,
+         coat,
+         at_directions(0.01),
+         {{pair_graph, 0.299}}},
         {"half GGX 0.1, directions",
          false,
          gaussian<256, 40, 10>,
          half_ggx(0.1),
-         at_16(0.01),
+         at_directions(0.01),
          {{pair_graph, 1.29}}},
         {"coat 0.3, directions",
          true,
          gaussian<128, 50, 8>,
          {{"y"}, CoatedDiffuse{1.5, 0.3, 0.8}},
-         at_16(0.005),
+         at_directions(0.005),
          {{pair_graph, 0.81}}},
         {"GGX 0.15, directions",
          true,
          gaussian<128, 50, 8>,
          ggx(0.15, 0.15),
-         at_16(0.005),
+         at_directions(0.005),
          {{pair_graph, 0.52}}},
     };
 }

@@ -16,7 +16,7 @@
 namespace gonio {
 namespace {
 
-using bench::into_cells, bench::transport_jobs, bench::TransportJob;
+using bench::at_directions, bench::into_cells, bench::transport_jobs, bench::TransportJob;
 using enum TransportKind;
 
 Material ggx(double alpha) {
@@ -25,10 +25,6 @@ Material ggx(double alpha) {
 HeightField relief() {
     return bench::gaussian<32, 50, 4>();
 }
-BrdfPlan at_directions(double target) {
-    return bench::to_target(honest::plan(), target);
-}
-
 TransportKind chosen(const HeightField& surface, const Material& material, const BrdfPlan& plan,
                      std::string* why = nullptr) {
     const SimplifiedScene simple = simplify_brdf_scene(surface, material, true);
