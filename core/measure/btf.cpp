@@ -252,6 +252,12 @@ class Measurement {
             for (int c = 0; c < shape.n_channels; ++c)
                 finish_block(sums_[at++], c, first, area, kinds_differ);
         const double mesh = predict_mesh_bias(surface_).guess / std::pow(light_.samples().refinement, 2);
+        std::vector<double> frames;  // of each view
+        for (int view = 0; view < shape.n_views; ++view) {
+            const size_t size = shape.n_pixels() * shape.pixel_samples;
+            frames.push_back(
+                frame_doubt(surface_, plan_, {btf().view_maps.data() + view * size, size}, view));
+        }
         for (int c = 0; c < shape.n_channels; ++c)
             for (size_t row = 0; row < rows(); ++row) {
                 const size_t mean = c * rows() + row, view = row % views_.size();
@@ -261,7 +267,7 @@ class Measurement {
                 const double kinds =
                     (pixel_means_->lower_share()[view] - 0.5) * kinds_differ[plane(c, light)];
                 btf().mean.bias[mean] = static_cast<float>(
-                    std::hypot(btf().mean.f[mean] * std::hypot(light_.remainder(), mesh),
+                    std::hypot(btf().mean.f[mean] * std::hypot(light_.remainder(), mesh, frames[view]),
                                btf().mean.f[mean] * std::sqrt(pixel_places_[plane(c, light)]), kinds));
             }
     }

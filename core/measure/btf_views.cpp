@@ -95,6 +95,20 @@ std::optional<MarchGrid> bent_view_grid(const HeightField& surface, const BtfPla
     return make_march_grid(bent);
 }
 
+double frame_doubt(const HeightField& s, const BtfPlan& plan, std::span<const uint32_t> map, int view) {
+    if (!s.base.is_curved()) return 0;
+    const size_t n_cells = static_cast<size_t>(s.nx) * s.ny;
+    double height = 0;
+    for (const uint32_t facet : map) {
+        const int kind = static_cast<int>(facet / n_cells % 2), j = static_cast<int>(facet % n_cells / s.nx),
+                  i = static_cast<int>(facet % s.nx);
+        height += (s.at(i, j) + s.at(i + 1, j + 1) + (kind == 0 ? s.at(i + 1, j) : s.at(i, j + 1))) / 3;
+    }
+    height = height / static_cast<double>(map.size()) - view_plane_height(s, plan);
+    const double slope = std::tan(radians(plan.outgoing[view].theta_deg));
+    return std::max(std::abs(s.base.kappa_1), std::abs(s.base.kappa_2)) * std::abs(height) * slope * slope;
+}
+
 std::vector<uint32_t> make_view_maps(const HeightField& surface, const MarchGrid& grid, const BtfPlan& plan,
                                      const BtfShape& shape, const std::vector<int>& views,
                                      const SubSample& place, int refinement, int n_threads,
