@@ -40,7 +40,8 @@ Btf measured(const HeightField& surface, const Material& material, const BtfPlan
 TEST(LightFieldUnderASky, HasTheRadianceThatRelightFinds) {
     const Environment sky = in_colour(test::uneven_sky());
     const Material material = gray({0.8, 0.5, 0.3});
-    const BtfPlan plan = plan_of_views(2);
+    BtfPlan plan = plan_of_views(2);
+    plan.accuracy.samples->sub_samples = 2;
     const Btf btf = measured(field(), material, plan, sky);
     RelightPlan same;
     same.outgoing = views;
@@ -159,6 +160,24 @@ TEST(GlossyLightFieldUnderASky, AgreesWithThePathTracer) {
         EXPECT_NEAR(btf.mean.f[v], traced.radiance / irradiance, 3 * sigma) << v;
         EXPECT_LT(sigma, 0.03 * btf.mean.f[v]);
     }
+}
+
+// How far few runs are from many is what they say of one pixel.
+TEST(GlossyLightFieldUnderASky, StatesTheErrorOfAPixel) {
+    BtfPlan plan = plan_of_views(4);
+    plan.pixel_samples = 1;
+    const Pictures few = glossy(field(), ggx(0.3), plan, test::uneven_sky());
+    plan.accuracy.samples->replicates = 32;
+    plan.accuracy.seed = 2;
+    const Pictures many = glossy(field(), ggx(0.3), plan, test::uneven_sky());
+    double squares = 0;
+    const size_t n = few.btf.shape.n_pixels();
+    for (size_t v = 0; v < views.size(); ++v)
+        for (size_t p = 0; p < n; ++p)
+            squares +=
+                std::pow(few.images[v][p] - many.images[v][p], 2) / static_cast<double>(views.size() * n);
+    const double stated = std::hypot(few.btf.pixel_se[0], many.btf.pixel_se[0]);
+    EXPECT_NEAR(std::sqrt(squares), stated, 0.2 * stated);
 }
 
 // Each pixel of a plane is seen from its own direction: mirrored in it under a sky of two halves, the one is
