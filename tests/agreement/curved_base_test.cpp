@@ -188,6 +188,7 @@ INSTANTIATE_TEST_SUITE_P(Bases, CurvedBase,
 // so on any base, so only gentle bases are for it. There shadows are right to a hundredth of what bending
 // does to them; of what it does to indirect light two thirds are found (without the horizon's shift half of
 // that), the rest is what bending hides and shows inside the relief.
+// 0.4 is no theory's: it keeps what was measured (0.35) from getting worse.
 TEST(CorrectedHorizons, AgreeOnGentleBases) {
     const std::vector<AnglesDeg> lights{{0, 0}, {40, 70}, {65, 180}, {75, 310}},
         views{{5, 0}, {50, 20}, {70, 200}};
