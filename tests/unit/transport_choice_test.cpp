@@ -122,6 +122,20 @@ TEST(TransportChoice, NarrowLobesGoToForwardTracing) {
         EXPECT_EQ(chosen(relief(), ggx(alpha), into_cells(equal_cells(16), 0.05)), forward) << alpha;
 }
 
+// What chains miss of narrow lobes is in what is foreseen, though runs that miss it alike agree.
+TEST(TransportChoice, ForeseesWhatStatedErrorsDoNotTell) {
+    BrdfPlan plan = at_directions(0.01);
+    plan.accuracy = {};
+    plan.accuracy.samples = Accuracy::Samples{64, 64, 1, 32};
+    const auto foreseen = [&](double alpha) {
+        const SimplifiedScene simple = simplify_brdf_scene(bench::gaussian<128, 50, 8>(), ggx(alpha), true);
+        const MarchGrid bounds = march_bounds(simple.surface);
+        return choose_transport(brdf_scene(simple, bounds, plan, {})).cost.relative_error;
+    };
+    EXPECT_LT(foreseen(0.3), 0.003);
+    EXPECT_GT(foreseen(1e-3), 0.08);
+}
+
 // A job with another target may have runs in common, but not those of another transport.
 TEST(TransportChoice, NamesRuns) {
     const Material gray({"y"}, Lambertian{0.5});
