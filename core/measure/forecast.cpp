@@ -31,7 +31,7 @@ struct FamilyOf {
         return lobe.distribution == Microfacet::Distribution::ggx ? Family{0.45e-9, 0, 1, 1}
                                                                   : Family{2.6e-9, 12e-9, 1.6, 2.2};
     }
-    Family operator()(const CoatedDiffuse&) const { return {5e-9, 45e-9, 1.5, 4}; }
+    Family operator()(const CoatedDiffuse&) const { return {1e-9, 4e-9, 1.5, 4}; }
     Family operator()(const Mirror&) const { return {0, 0, 1, 1}; }
 };
 
