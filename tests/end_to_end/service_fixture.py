@@ -26,7 +26,7 @@ JOB = {"surface": GROOVE, "material": LAMBERTIAN, "measure": MEASURE}
 # Minutes of work.
 LONG = {"surface": {"generate": "gaussian", "samples": 512, "pitch": "1 um", "correlation_length": "4 um", "rms_slope": 1},
         "material": LAMBERTIAN, "measure": MEASURE | {"incident": {"klems": "full"}, "outgoing": {"klems": "full"}},
-        "accuracy": {"target_relative_error": 1e-6}}
+        "accuracy": {"target_relative_error": 1e-4}}
 # Minutes of work, in runs of milliseconds.
 MANY_RUNS = {"surface": {"generate": "gaussian", "samples": 24, "pitch": "1 um", "correlation_length": "3 um", "rms_slope": 1},
              "material": LAMBERTIAN, "measure": MEASURE, "accuracy": {"samples": {"directions": 1024, "replicates": 4096}}}
