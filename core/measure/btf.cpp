@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -17,6 +16,7 @@
 #include "measure/mesh_bias.h"
 #include "measure/pixel_means.h"
 #include "measure/run.h"
+#include "measure/run_limit.h"
 #include "measure/sky_light.h"
 #include "scattering/picture_kernels.h"
 
@@ -62,7 +62,7 @@ class Measurement {
           monitor_(monitor),
           lights_(vectors(plan.incident)),
           views_(vectors(view_angles(surface, plan))),
-          started_(std::chrono::steady_clock::now()),
+          limit_(plan.accuracy, fewest_runs, most_runs),
           light_(surface, material, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor),
           bent_grid_(bent_view_grid(surface, plan)) {
         btf().shape = btf_shape(surface, material, plan, samples_of(plan).refinement);
@@ -90,7 +90,7 @@ class Measurement {
         look_at_other_places();
         squares_.assign(static_cast<size_t>(btf().shape.n_channels) * btf().shape.n_lights, 0.0);
         pixel_places_.assign(squares_.size(), 0.0);
-        while (wants_more()) add_run();
+        while (limit_.wants_more(n_runs(), error_)) add_run();
         finish();
         describe();
         return std::move(result_);
@@ -102,19 +102,8 @@ class Measurement {
     size_t rows() const { return btf().shape.n_lights * views_.size(); }
     int n_runs() const { return means_.count(); }
 
-    bool wants_more() const {
-        if (n_runs() < fewest_runs) return true;
-        if (plan_.accuracy.samples) return n_runs() < light_.samples().replicates;
-        if (plan_.accuracy.max_seconds) {
-            const double seconds =
-                std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-            if (seconds * (n_runs() + 1) / n_runs() > *plan_.accuracy.max_seconds) return false;
-        }
-        return error_ > plan_.accuracy.target() && n_runs() < most_runs;
-    }
-
     void add_run() {
-        monitor_.report({fraction(), "run " + std::to_string(n_runs() + 1), error_});
+        monitor_.report({limit_.fraction(n_runs()), "run " + std::to_string(n_runs() + 1), error_});
         light_.start_run(n_runs());
         std::vector<float> run(btf().shape.n_channels * rows());
         size_t sum = 0;
@@ -322,12 +311,6 @@ class Measurement {
                (static_cast<double>(*high) - *low) * flattest;
     }
 
-    double fraction() const {
-        const int planned =
-            plan_.accuracy.samples ? light_.samples().replicates : std::max(fewest_runs, n_runs() + 1);
-        return static_cast<double>(n_runs()) / planned;
-    }
-
     void describe() {
         Report& report = result_.report;
         report.relative_error = error_;
@@ -336,8 +319,7 @@ class Measurement {
         light_.describe(n_runs(), report);
         report.counters.push_back({"view_rays", static_cast<double>(btf().shape.maps_size())});
         report.counters.push_back({"view_rays_unresolved", unresolved_});
-        report.seconds = {
-            {"wall", std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count()}};
+        report.seconds = {{"wall", limit_.seconds()}};
         if (unresolved_ > 0)
             report.warnings.push_back(number(unresolved_) +
                                       " view rays are so nearly horizontal that they were given up");
@@ -354,7 +336,7 @@ class Measurement {
     const RunOptions& options_;
     const Monitor& monitor_;
     std::vector<Vec3> lights_, views_;
-    std::chrono::steady_clock::time_point started_;
+    RunLimit limit_;
     FacetLight light_;
     std::optional<MarchGrid> bent_grid_;  // of the views
     std::optional<SkyLight> sky_;

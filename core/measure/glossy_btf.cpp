@@ -1,7 +1,6 @@
 #include "measure/glossy_btf.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "base/error.h"
@@ -14,6 +13,7 @@
 #include "measure/glossy_sky.h"
 #include "measure/glossy_sky_pictures.h"
 #include "measure/mesh_bias.h"
+#include "measure/run_limit.h"
 
 namespace gonio {
 namespace {
@@ -42,13 +42,13 @@ class Measurement final : public GlossyPictures {
           channels_(material.channels),
           samples_(samples_of(plan)),
           shape_(btf_shape(surface, material, plan, samples_.refinement)),
-          started_(std::chrono::steady_clock::now()),
+          limit_(plan.accuracy, fewest_runs, most_runs, 0.5),
           pixels_(surface, material, plan, samples_, options, monitor),
           bent_grid_(bent_view_grid(surface, plan)) {
         for (int k = 0, n = std::min(most_probes, shape_.n_views); k < n; ++k)
             probes_.push_back(static_cast<int>((k + 0.5) * shape_.n_views / n));
-        while (wants_more()) {
-            monitor.report({0.5 * pixels_.n_runs() / std::max(fewest_runs, pixels_.n_runs() + 1),
+        while (limit_.wants_more(pixels_.n_runs(), error_) && fits_another()) {
+            monitor.report({0.5 * limit_.fraction(pixels_.n_runs()),
                             "run " + std::to_string(pixels_.n_runs() + 1), error_});
             pixels_.add_run();
             if (pixels_.n_runs() >= fewest_runs && !plan.accuracy.samples) judge();
@@ -103,17 +103,9 @@ class Measurement final : public GlossyPictures {
     }
 
   private:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-    }
-
-    bool wants_more() const {
-        const int runs = pixels_.n_runs();
-        if (runs < fewest_runs) return true;
-        if (plan_.accuracy.samples) return runs < samples_.replicates;
-        if (plan_.accuracy.max_seconds && seconds() * (runs + 1) / runs > 0.5 * *plan_.accuracy.max_seconds)
-            return false;
-        return error_ > plan_.accuracy.target() && runs < most_runs && pixels_.fits_another();
+    // Runs that are asked for, or needed for any error, are made whatever they take.
+    bool fits_another() const {
+        return plan_.accuracy.samples || pixels_.n_runs() < fewest_runs || pixels_.fits_another();
     }
 
     // images: [light][channel][pixel] of the view, or empty if they are not wanted.
@@ -231,7 +223,7 @@ class Measurement final : public GlossyPictures {
             plan_.accuracy.samples || error_ <= plan_.accuracy.target() || plan_.accuracy.target() == 0;
         pixels_.describe(report_);
         report_.counters.push_back({"view_rays_unresolved", unresolved_});
-        report_.seconds = {{"wall", seconds()}};
+        report_.seconds = {{"wall", limit_.seconds()}};
         if (pixels_.lobe_share_of_pair() > most_honest_share)
             report_.warnings.push_back(
                 "the lobes are narrower than the shared directions are dense: orders 3 and up of single "
@@ -245,7 +237,7 @@ class Measurement final : public GlossyPictures {
     const std::vector<std::string>& channels_;
     Accuracy::Samples samples_;
     BtfShape shape_;
-    std::chrono::steady_clock::time_point started_;
+    RunLimit limit_;
     GlossyPixels pixels_;
     std::optional<MarchGrid> bent_grid_;
     std::vector<int> probes_;  // views that are judged by

@@ -1,7 +1,6 @@
 #include "measure/glossy_sky_pictures.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -13,6 +12,7 @@
 #include "measure/glossy_sky.h"
 #include "measure/mesh_bias.h"
 #include "measure/relit_runs.h"
+#include "measure/run_limit.h"
 
 namespace gonio {
 namespace {
@@ -27,7 +27,7 @@ class SkyPictures final : public GlossyPictures {
           plan_(plan),
           options_(options),
           monitor_(monitor),
-          started_(std::chrono::steady_clock::now()),
+          limit_(plan.accuracy, fewest_runs, most_runs),
           samples_(sky_pictures_samples(plan)),
           shape_(btf_shape(surface, material, plan, samples_.refinement)) {
         require_memory();
@@ -40,9 +40,9 @@ class SkyPictures final : public GlossyPictures {
         maps_ = view_maps(shape_, all, pixel_centre);
         sums_.assign(shape_.n_channels, std::vector<float>(shape_.n_views * shape_.n_pixels(), 0.0f));
         squares_.assign(shape_.n_channels, 0.0);
-        while (wants_more()) {
-            monitor.report({static_cast<double>(means_.count()) / std::max(fewest_runs, means_.count() + 1),
-                            "run " + std::to_string(means_.count() + 1), error_});
+        while (limit_.wants_more(means_.count(), error_)) {
+            monitor.report(
+                {limit_.fraction(means_.count()), "run " + std::to_string(means_.count() + 1), error_});
             add_run();
         }
         describe(material);
@@ -65,18 +65,6 @@ class SkyPictures final : public GlossyPictures {
     }
 
   private:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-    }
-    bool wants_more() const {
-        const int runs = means_.count();
-        if (plan_.accuracy.samples) return runs < samples_.replicates;
-        if (runs < fewest_runs) return true;
-        if (plan_.accuracy.max_seconds && seconds() * (runs + 1) / runs > *plan_.accuracy.max_seconds)
-            return false;
-        return error_ > plan_.accuracy.target() && runs < most_runs;
-    }
-
     void require_memory() const {
         const double bytes = sky_pictures_bytes(surface_, shape_, samples_);
         if (bytes > static_cast<double>(options_.max_bytes))
@@ -209,14 +197,14 @@ class SkyPictures final : public GlossyPictures {
             plan_.accuracy.samples || error_ <= plan_.accuracy.target() || plan_.accuracy.target() == 0;
         sky_->describe(means_.count(), report_);
         report_.counters.push_back({"view_rays_unresolved", unresolved_});
-        report_.seconds = {{"wall", seconds()}};
+        report_.seconds = {{"wall", limit_.seconds()}};
     }
 
     const HeightField& surface_;
     const BtfPlan& plan_;
     const RunOptions& options_;
     const Monitor& monitor_;
-    std::chrono::steady_clock::time_point started_;
+    RunLimit limit_;
     Accuracy::Samples samples_;
     BtfShape shape_;
     std::unique_ptr<GlossySky> sky_;

@@ -1,7 +1,6 @@
 #include "measure/maps.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 
@@ -10,6 +9,7 @@
 #include "measure/describe.h"
 #include "measure/facet_light.h"
 #include "measure/glossy_pixels.h"
+#include "measure/run_limit.h"
 
 namespace gonio {
 namespace {
@@ -47,7 +47,7 @@ class Measurement {
           plan_(plan),
           monitor_(monitor),
           n_cells_(static_cast<size_t>(surface.nx) * surface.ny),
-          started_(std::chrono::steady_clock::now()),
+          limit_(plan.accuracy, fewest_runs, most_runs),
           facets_(lambertian_or_black(material)),
           light_(surface, facets_, plan.max_order, samples_of(plan), plan.accuracy.seed, options, monitor) {
         if (pure_lambertian(material)) return;
@@ -58,9 +58,8 @@ class Measurement {
     }
 
     MapsResult run() {
-        while (wants_more()) {
-            monitor_.report(
-                {static_cast<double>(runs_) / (runs_ + 1), "run " + std::to_string(runs_ + 1), error_});
+        while (limit_.wants_more(runs_, error_)) {
+            monitor_.report({limit_.fraction(runs_), "run " + std::to_string(runs_ + 1), error_});
             light_.start_run(runs_);
             next_ = 0;
             add_lights();
@@ -82,22 +81,11 @@ class Measurement {
         result.report.relative_error = error_;
         result.report.target_met =
             plan_.accuracy.samples || plan_.accuracy.target() == 0 || error_ <= plan_.accuracy.target();
-        result.report.seconds = {{"wall", seconds()}};
+        result.report.seconds = {{"wall", limit_.seconds()}};
         return result;
     }
 
   private:
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-    }
-    bool wants_more() const {
-        if (runs_ < fewest_runs) return true;
-        if (plan_.accuracy.samples) return runs_ < plan_.accuracy.samples->replicates;
-        if (plan_.accuracy.max_seconds && seconds() * (runs_ + 1) / runs_ > *plan_.accuracy.max_seconds)
-            return false;
-        return error_ > plan_.accuracy.target() && runs_ < most_runs;
-    }
-
     // Adds one run of the next layer: value(unknown) of every facet part, averaged over a cell.
     template <class Value>
     void add(const std::string& name, bool is_light, Value&& value) {
@@ -234,7 +222,7 @@ class Measurement {
     const MapsPlan& plan_;
     const Monitor& monitor_;
     size_t n_cells_;
-    std::chrono::steady_clock::time_point started_;
+    RunLimit limit_;
     Material facets_;
     FacetLight light_;
     BtfPlan lamps_;  // what glossy_ is lit by

@@ -1,7 +1,6 @@
 #include "measure/relight.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
@@ -13,6 +12,7 @@
 #include "measure/glossy_sky.h"
 #include "measure/mesh_bias.h"
 #include "measure/relit_runs.h"
+#include "measure/run_limit.h"
 #include "visibility/view_map.h"
 
 namespace gonio {
@@ -61,7 +61,7 @@ class Measurement {
           plan_(plan),
           options_(options),
           monitor_(monitor),
-          started_(std::chrono::steady_clock::now()),
+          limit_(plan.accuracy, fewest_runs, most_runs),
           n_channels_(static_cast<int>(material.channels.size())),
           samples_(samples_of(plan)) {
         const double bytes = peak_bytes(surface, material, plan);
@@ -79,8 +79,9 @@ class Measurement {
     RelightResult run() {
         sums_.assign(n_channels_, std::vector<double>(runs_->layers() * runs_->tile().n_unknowns(), 0.0));
         squares_.assign(n_channels_, 0.0);
-        while (wants_more()) {
-            monitor_.report({fraction(), "run " + std::to_string(means_.count() + 1), error_});
+        while (limit_.wants_more(means_.count(), error_)) {
+            monitor_.report(
+                {limit_.fraction(means_.count()), "run " + std::to_string(means_.count() + 1), error_});
             add_run(means_.count());
             if (means_.count() >= 2) estimate_errors();
         }
@@ -91,22 +92,6 @@ class Measurement {
     }
 
   private:
-    bool wants_more() const {
-        const int runs = means_.count();
-        if (plan_.accuracy.samples) return runs < samples_.replicates;
-        if (runs < fewest_runs) return true;
-        if (plan_.accuracy.max_seconds && seconds() * (runs + 1) / runs > *plan_.accuracy.max_seconds)
-            return false;
-        return error_ > plan_.accuracy.target() && runs < most_runs;
-    }
-    double seconds() const {
-        return std::chrono::duration<double>(std::chrono::steady_clock::now() - started_).count();
-    }
-    double fraction() const {
-        const int planned =
-            plan_.accuracy.samples ? samples_.replicates : std::max(fewest_runs, means_.count() + 1);
-        return static_cast<double>(means_.count()) / planned;
-    }
     void add_run(int run) {
         const RelitRun one = runs_->run(run);
         means_.add(one.means);
@@ -204,7 +189,7 @@ class Measurement {
         runs_->describe(means_.count(), report);
         report.settings.emplace_back("azimuths", std::to_string(plan_.azimuths));
         report.counters.push_back({"view_rays_unresolved", unresolved_});
-        report.seconds = {{"wall", seconds()}};
+        report.seconds = {{"wall", limit_.seconds()}};
         if (unresolved_ > 0)
             report.warnings.push_back(number(unresolved_) +
                                       " view rays are so nearly horizontal that they were given up");
@@ -214,7 +199,7 @@ class Measurement {
     const RelightPlan& plan_;
     const RunOptions& options_;
     const Monitor& monitor_;
-    std::chrono::steady_clock::time_point started_;
+    RunLimit limit_;
     int n_channels_;
     Accuracy::Samples samples_;
     std::vector<Vec3> views_;

@@ -293,45 +293,46 @@ TEST(Forward, CellsThatFewRaysReachAreNotSureToBeDark) {
     EXPECT_GT(empty, 0);
 }
 
+// One run over perfect mirrors, and what leaves of its light.
+struct MirrorRun {
+    ForwardTally tally;
+    double leaving = 0;
+};
+MirrorRun trace_mirrors(const HeightField& surface, const AnglesDeg& light) {
+    const std::vector<ReceiverCell> cells = equal_cells(30);
+    const Material material = perfect_mirror();
+    const MarchGrid march = make_march_grid(surface);
+    const ForwardScene scene(surface, march, material, cells);
+    ForwardSettings settings;
+    settings.sub_samples = {{0.3, 0.8}};
+    MirrorRun run{trace_light(scene, to_vector(light), settings, 1, 1, 0, {})};
+    for (const std::vector<double>& order : run.tally.share)
+        for (const double share : order) run.leaving += share;
+    return run;
+}
+
 // Light that is still to and fro between two mirrors after the last order is no loss: it is left over, and
 // the table's bias holds it.
 TEST(Forward, WhatIsStillInsideIsSaid) {
     const HeightField slot = generate_v_groove(8, 8e-6, 88.8);  // back up after 75 reflections
-    const std::vector<ReceiverCell> cells = equal_cells(30);
-    const Material material = perfect_mirror();
-    const MarchGrid march = make_march_grid(slot);
-    const ForwardScene scene(slot, march, material, cells);
-    ForwardSettings settings;
-    settings.sub_samples = {{0.3, 0.8}};
-    const ForwardTally tally = trace_light(scene, to_vector({0, 0}), settings, 1, 1, 0, {});
-    double left = 0;
-    for (const std::vector<double>& order : tally.share)
-        for (const double share : order) left += share;
-    EXPECT_GT(tally.remainder[0], 0.1);
-    EXPECT_NEAR(left + tally.remainder[0], 1, 1e-5);
+    const MirrorRun run = trace_mirrors(slot, {0, 0});
+    const double remainder = run.tally.remainder[0];
+    EXPECT_GT(remainder, 0.1);
+    EXPECT_NEAR(run.leaving + remainder, 1, 1e-5);
 
-    const Table table = measure_brdf(slot, material, cell_plan(cells, {{0, 0}}), {}).table;
+    const Table table = measure_brdf(slot, perfect_mirror(), cell_plan(equal_cells(30), {{0, 0}}), {}).table;
     const float least = *std::min_element(table.bias.begin(), table.bias.end());
-    EXPECT_GT(least * pi, 0.5 * tally.remainder[0]);
+    EXPECT_GT(least * pi, 0.5 * remainder);
 }
 
 // So are rays that run along below the top of the relief without ever meeting it.
 TEST(Forward, RaysGivenUpAreLeftOver) {
     HeightField post = generate_plane(8, 1e-6);
     post.heights[3 * 8 + 3] = 1e-6F;
-    const std::vector<ReceiverCell> cells = equal_cells(30);
-    const Material material = perfect_mirror();
-    const MarchGrid march = make_march_grid(post);
-    const ForwardScene scene(post, march, material, cells);
-    ForwardSettings settings;
-    settings.sub_samples = {{0.3, 0.8}};
-    const ForwardTally tally = trace_light(scene, to_vector({89.99999, 0}), settings, 1, 1, 0, {});
-    double left = 0;
-    for (const std::vector<double>& order : tally.share)
-        for (const double share : order) left += share;
-    EXPECT_GT(tally.rays_lost, 0);
-    EXPECT_GT(tally.remainder[0], 0.01);
-    EXPECT_NEAR(left + tally.remainder[0], 1, 1e-5);
+    const MirrorRun run = trace_mirrors(post, {89.99999, 0});
+    EXPECT_GT(run.tally.rays_lost, 0);
+    EXPECT_GT(run.tally.remainder[0], 0.01);
+    EXPECT_NEAR(run.leaving + run.tally.remainder[0], 1, 1e-5);
 }
 
 // Large reliefs are started from some of their blocks: those of all phases together are the whole.

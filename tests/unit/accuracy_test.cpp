@@ -7,6 +7,7 @@
 #include <random>
 
 #include "base/numeric.h"
+#include "measure/run_limit.h"
 
 namespace gonio {
 namespace {
@@ -181,6 +182,35 @@ TEST(Accuracy, RowsWithoutLightOrNoiseHaveNoError) {
     }
     for (const Moments* moments : {&constant, &black})
         for (const double se : standard_errors(*moments, 0, groups)) EXPECT_EQ(se, 0);
+}
+
+TEST(RunLimit, RunsAreThoseAskedForOrThoseThatATargetTakes) {
+    Accuracy asked;
+    asked.samples = Accuracy::Samples{1, 64, 1, 3};
+    const RunLimit three(asked, 4, 64);  // more than the fewest are not insisted on
+    EXPECT_TRUE(three.wants_more(2, 0));
+    EXPECT_FALSE(three.wants_more(3, 1));
+    EXPECT_DOUBLE_EQ(three.fraction(1), 1.0 / 3);
+
+    Accuracy target;
+    target.target_relative_error = 0.01;
+    const RunLimit open(target, 2, 8);
+    EXPECT_TRUE(open.wants_more(1, 0));
+    EXPECT_FALSE(open.wants_more(2, 0.01));
+    EXPECT_TRUE(open.wants_more(7, 0.02));
+    EXPECT_FALSE(open.wants_more(8, 0.02));
+    EXPECT_DOUBLE_EQ(open.fraction(3), 0.75);
+}
+
+TEST(RunLimit, ARunThatWouldEndTooLateIsNotBegun) {
+    Accuracy brief;
+    brief.target_relative_error = 0.01;
+    brief.max_seconds = 1e-12;
+    EXPECT_TRUE(RunLimit(brief, 2, 8).wants_more(1, 1));  // without two there is no error
+    EXPECT_FALSE(RunLimit(brief, 2, 8).wants_more(2, 1));
+    brief.max_seconds = 1e6;
+    EXPECT_TRUE(RunLimit(brief, 2, 8).wants_more(2, 1));
+    EXPECT_FALSE(RunLimit(brief, 2, 8, 1e-18).wants_more(2, 1));
 }
 
 }  // namespace
