@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "server/array_file.h"
 #include "server/json_node.h"
+#include "server/npy_file.h"
 
 namespace gonio {
 namespace {
@@ -117,19 +118,64 @@ ArraySection images_array(const BtfShape& shape) {
              static_cast<size_t>(shape.pixels_x)}};
 }
 
-void write_images(ordered_json head, const Btf& btf, const std::string& path, const Monitor& monitor) {
+// [channel][light][view], as lists in lists.
+ordered_json nested(const std::vector<float>& values, const BtfShape& shape) {
+    ordered_json list = ordered_json::array();
+    auto value = values.begin();
+    for (int c = 0; c < shape.n_channels; ++c)
+        for (int l = 0; l < shape.n_lights; ++l, value += shape.n_views)
+            list[c].push_back(std::vector<float>(value, value + shape.n_views));
+    return list;
+}
+
+// What an .npy file says behind its images: the head of the file of arrays, whose small arrays stand before
+// it, for they can be longer than where provenance is looked for.
+ordered_json last_line(const ordered_json& head, const Btf& btf) {
+    ordered_json said{{"axes", {"view", "light", "channel", "row", "column"}},
+                      {"mean_axes", {"channel", "light", "view"}},
+                      {"mean", nested(btf.mean.f, btf.shape)},
+                      {"mean_se", nested(btf.mean.se, btf.shape)},
+                      {"mean_bias", nested(btf.mean.bias, btf.shape)}};
+    for (int c = 0; c < btf.shape.n_channels; ++c) {
+        const auto first = btf.pixel_se.begin() + static_cast<long>(c) * btf.shape.n_lights;
+        said["pixel_se"].push_back(std::vector<float>(first, first + btf.shape.n_lights));
+    }
+    said.update(head);
+    return said;
+}
+
+// Takes the images of one view after the other: [light][channel][row][column], halves.
+using ImageSink = std::function<void(std::span<const uint16_t> images)>;
+
+void write_npy_images(const std::string& path, const ordered_json& head, const BtfShape& shape,
+                      const std::function<const Btf&(const ImageSink&)>& write) {
+    write_npy_file(path, "'<f2'", images_array(shape).shape, [&](std::ostream& out) {
+        return last_line(head, write([&](std::span<const uint16_t> images) {
+                             out.write(reinterpret_cast<const char*>(images.data()),
+                                       static_cast<std::streamsize>(images.size_bytes()));
+                         }));
+    });
+}
+
+void write_images(ordered_json head, const Btf& btf, ImageForm form, const std::string& path,
+                  const Monitor& monitor) {
     const BtfShape& shape = btf.shape;
-    head["form"] = "images";
-    std::vector<ArraySection> sections = small_arrays(shape);
-    sections.push_back(images_array(shape));
-    write_array_file(path, std::move(head), std::move(sections), [&](ArrayWriter& writer) {
-        append_small(writer, btf);
+    const auto write_views = [&](const ImageSink& sink) -> const Btf& {
         std::vector<uint16_t> images(shape.images_size() / shape.n_views);
         for (int view = 0; view < shape.n_views; ++view) {
             monitor.report({static_cast<double>(view) / shape.n_views, "writing images", 0});
             expand_view(shape, btf.radiance, btf.view_maps, view, images);
-            writer.append(std::span<const uint16_t>(images));
+            sink(images);
         }
+        return btf;
+    };
+    head["form"] = "images";
+    if (form == ImageForm::npy) return write_npy_images(path, head, shape, write_views);
+    std::vector<ArraySection> sections = small_arrays(shape);
+    sections.push_back(images_array(shape));
+    write_array_file(path, std::move(head), std::move(sections), [&](ArrayWriter& writer) {
+        append_small(writer, btf);
+        write_views([&](std::span<const uint16_t> images) { writer.append(images); });
     });
 }
 
@@ -144,6 +190,12 @@ const BtfPlan& pictures_of(const LoadedJob& job) {
     return std::get<BtfPlan>(job.job.plan);
 }
 
+std::optional<ImageForm> image_form(const std::string& format) {
+    if (format == "images") return ImageForm::arrays;
+    if (format == "npy") return ImageForm::npy;
+    return std::nullopt;
+}
+
 void write_factored_btf(const LoadedJob& job, const Btf& btf, const std::string& path) {
     write_array_file(path, head_of(job, btf), factored_arrays(btf.shape), [&](ArrayWriter& writer) {
         append_small(writer, btf);
@@ -152,12 +204,13 @@ void write_factored_btf(const LoadedJob& job, const Btf& btf, const std::string&
     });
 }
 
-void write_btf_images(const LoadedJob& job, const Btf& btf, const std::string& path, const Monitor& monitor) {
-    write_images(head_of(job, btf), btf, path, monitor);
+void write_btf_images(const LoadedJob& job, const Btf& btf, ImageForm form, const std::string& path,
+                      const Monitor& monitor) {
+    write_images(head_of(job, btf), btf, form, path, monitor);
 }
 
-Btf write_glossy_images(const LoadedJob& job, GlossyBtf& glossy, const std::string& path,
-                        const std::function<void(int view, std::span<const uint16_t> images)>& on_view) {
+Btf write_glossy_images(const LoadedJob& job, GlossyBtf& glossy, const std::vector<OutputRequest>& files,
+                        const GlossyPictures::OnView& on_view) {
     Btf btf;
     btf.shape = glossy.shape();
     btf.mean.channels = job.material.channels;
@@ -166,13 +219,29 @@ Btf write_glossy_images(const LoadedJob& job, GlossyBtf& glossy, const std::stri
     head["form"] = "images";
     std::vector<ArraySection> sections = small_arrays(btf.shape);
     sections.insert(sections.begin(), images_array(btf.shape));
-    write_array_file(path, std::move(head), std::move(sections), [&](ArrayWriter& writer) {
-        btf = glossy.pictures([&](int view, std::span<const uint16_t> images) {
-            writer.append(images);
-            on_view(view, images);
-        });
-        append_small(writer, btf);
-    });
+    std::vector<ImageSink> sinks;
+    // The pictures are made once: inside the last file, which is written inside the one before it.
+    const std::function<const Btf&(size_t)> write_from = [&](size_t k) -> const Btf& {
+        if (k == files.size())
+            btf = glossy.pictures([&](int view, std::span<const uint16_t> images) {
+                for (const ImageSink& sink : sinks) sink(images);
+                on_view(view, images);
+            });
+        else if (const auto form = image_form(files[k].format); !form)
+            write_from(k + 1);
+        else if (form == ImageForm::npy)
+            write_npy_images(files[k].path, head, btf.shape, [&](const ImageSink& sink) -> const Btf& {
+                sinks.push_back(sink);
+                return write_from(k + 1);
+            });
+        else
+            write_array_file(files[k].path, head, sections, [&](ArrayWriter& writer) {
+                sinks.push_back([&](std::span<const uint16_t> images) { writer.append(images); });
+                append_small(writer, write_from(k + 1));
+            });
+        return btf;
+    };
+    write_from(0);
     return btf;
 }
 
@@ -214,9 +283,10 @@ StoredBtf read_factored_btf(const std::string& path) {
     return stored;
 }
 
-void expand_btf(const std::string& factored, const std::string& images, const Monitor& monitor) {
+void expand_btf(const std::string& factored, ImageForm form, const std::string& images,
+                const Monitor& monitor) {
     const StoredBtf stored = read_factored_btf(factored);
-    write_images(ordered_json::parse(stored.head), stored.btf, images, monitor);
+    write_images(ordered_json::parse(stored.head), stored.btf, form, images, monitor);
 }
 
 }  // namespace gonio

@@ -148,7 +148,7 @@ Report run_glossy(const LoadedJob& job, const std::vector<OutputRequest>& files,
         if (file.format == "btf")
             throw Error(ErrorCode::invalid_input, "/output", "btf",
                         "the factored form holds one radiance for each facet and light, and a glossy facet "
-                        "sends another to every view: ask for \"images\"");
+                        "sends another to every view: ask for \"images\" or \"npy\"");
     const BtfPlan& plan = pictures_of(job);
     GlossyBtf glossy(job.surface.surface, job.material, plan, options, monitor,
                      job.environment ? &*job.environment : nullptr);
@@ -157,17 +157,14 @@ Report run_glossy(const LoadedJob& job, const std::vector<OutputRequest>& files,
     const auto keep_preview = [&](int view, std::span<const uint16_t> images) {
         if (view == shown) preview.assign(images.begin(), images.end());
     };
-    std::optional<Btf> btf;
-    for (const OutputRequest& file : files)
-        if (file.format == "images") btf = write_glossy_images(job, glossy, file.path, keep_preview);
-    if (!btf) btf = glossy.pictures(keep_preview);
-    btf->mean.provenance = glossy.report().settings;
+    Btf btf = write_glossy_images(job, glossy, files, keep_preview);
+    btf.mean.provenance = glossy.report().settings;
     for (const OutputRequest& file : files) {
         monitor.check_cancelled();
         if (file.format == "png")
-            write_preview(job, btf->shape, preview, file.path);
-        else if (file.format != "images")
-            write_means(job, btf->mean, file);
+            write_preview(job, btf.shape, preview, file.path);
+        else if (!image_form(file.format))
+            write_means(job, btf.mean, file);
     }
     return glossy.report();
 }
@@ -183,8 +180,8 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
         monitor.check_cancelled();
         if (file.format == "btf") {
             write_factored_btf(job, result.btf, file.path);
-        } else if (file.format == "images") {
-            write_btf_images(job, result.btf, file.path, monitor);
+        } else if (const auto form = image_form(file.format)) {
+            write_btf_images(job, result.btf, *form, file.path, monitor);
         } else if (file.format == "png") {
             const BtfShape& shape = result.btf.shape;
             std::vector<uint16_t> images(shape.images_size() / shape.n_views);
@@ -201,7 +198,7 @@ Report run(const LoadedJob& job, const std::vector<OutputRequest>& files, const 
 // Pictures in their smaller form, where there is one.
 bool is_served(const LoadedJob& job, const std::string& format) {
     const bool has_factored_form = pure_lambertian(job.material) != nullptr;
-    return format != (has_factored_form ? "images" : "btf");
+    return has_factored_form ? !image_form(format) : format != "btf";
 }
 
 }  // namespace
@@ -209,7 +206,7 @@ bool is_served(const LoadedJob& job, const std::string& format) {
 MeasureKind btf_kind() {
     return {"btf",
             "btf",
-            {"btf", "images", "png", "csv", "json"},
+            {"btf", "images", "npy", "png", "csv", "json"},
             [](const JsonNode& measure, const Accuracy& accuracy) -> MeasurePlan {
                 return parse_btf(measure, accuracy);
             },
@@ -224,7 +221,7 @@ MeasureKind light_field_kind() {
     return {
         "light_field",
         "light_field",
-        {"btf", "images", "png"},
+        {"btf", "images", "npy", "png"},
         [](const JsonNode& measure, const Accuracy& accuracy) -> MeasurePlan {
             return parse_light_field(measure, accuracy);
         },

@@ -158,10 +158,11 @@ void write_arrays(const LoadedJob& job, const MapsResult& result, const std::str
 }
 
 void write_npy(const LoadedJob& job, const MapsResult& result, const std::string& path) {
-    write_npy_file(path, "'<f4'", shape_of(result.maps), head_of(job, result), [&](std::ostream& out) {
+    write_npy_file(path, "'<f4'", shape_of(result.maps), [&](std::ostream& out) {
         for (const MapLayer& layer : result.maps.layers)
             out.write(reinterpret_cast<const char*>(layer.pixels.data()),
                       static_cast<std::streamsize>(layer.pixels.size() * sizeof(float)));
+        return head_of(job, result);
     });
 }
 

@@ -164,9 +164,10 @@ void write_csv(const LoadedJob& job, const RelightResult& result, const std::str
 }
 
 void write_npy(const LoadedJob& job, const RelightResult& result, const std::string& path) {
-    write_npy_file(path, "'<f4'", images_shape(result.relit), means_of(job, result), [&](std::ostream& out) {
+    write_npy_file(path, "'<f4'", images_shape(result.relit), [&](std::ostream& out) {
         out.write(reinterpret_cast<const char*>(result.relit.images.data()),
                   static_cast<std::streamsize>(result.relit.images.size() * sizeof(float)));
+        return means_of(job, result);
     });
 }
 

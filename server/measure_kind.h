@@ -26,7 +26,7 @@ struct MeasureKind {
     nlohmann::json (*canonical)(const MeasurePlan& plan);
     Prediction (*predict)(const LoadedJob& job);
     // Measures and writes every file: whole or not at all (base/atomic_file.h), with job_provenance() in its
-    // first 2 MiB. Large products are streamed. The folders of the files are there. Throws Error, also
+    // first or last 2 MiB. Large products are streamed. The folders of the files are there. Throws Error, also
     // cancelled.
     Report (*run)(const LoadedJob& job, const std::vector<OutputRequest>& files, const RunOptions& options,
                   const Monitor& monitor);

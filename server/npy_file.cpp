@@ -6,7 +6,7 @@ namespace gonio {
 
 // https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html, version 1.0
 void write_npy_file(const std::string& path, const std::string& descr, const std::vector<size_t>& shape,
-                    const nlohmann::ordered_json& head, const std::function<void(std::ostream&)>& write) {
+                    const std::function<nlohmann::ordered_json(std::ostream&)>& write) {
     std::string extents;
     for (const size_t extent : shape) extents += std::to_string(extent) + ", ";
     std::string header = "{'descr': " + descr + ", 'fortran_order': False, 'shape': (" + extents + "), }";
@@ -17,7 +17,7 @@ void write_npy_file(const std::string& path, const std::string& descr, const std
     write_file_atomically(path, [&](std::ostream& out) {
         out << "\x93NUMPY" << '\x01' << '\x00' << static_cast<char>(length & 0xff)
             << static_cast<char>(length >> 8) << header;
-        write(out);
+        const nlohmann::ordered_json head = write(out);
         out << "\n" << head.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
     });
 }

@@ -10,8 +10,9 @@
 namespace gonio {
 
 // Whole or not at all. descr: the type of a number as Python text, "'<f4'" or a list of fields; `write` puts
-// out the numbers of `shape`, the last axis fastest, as they lie in memory.
+// out the numbers of `shape`, the last axis fastest, as they lie in memory, and returns what the last line
+// shall say of them, with job_provenance() in its last 2 MiB.
 void write_npy_file(const std::string& path, const std::string& descr, const std::vector<size_t>& shape,
-                    const nlohmann::ordered_json& head, const std::function<void(std::ostream&)>& write);
+                    const std::function<nlohmann::ordered_json(std::ostream&)>& write);
 
 }  // namespace gonio

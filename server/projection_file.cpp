@@ -188,10 +188,11 @@ void write_npy_projection(const HarmonicProjection& projection, const std::strin
     const ordered_json described = head(projection);
     write_npy_file(
         path, "[('value', '<f8'), ('se', '<f8'), ('bias', '<f8')]",
-        described["shape"].get<std::vector<size_t>>(), described, [&](std::ostream& out) {
+        described["shape"].get<std::vector<size_t>>(), [&](std::ostream& out) {
             for (size_t k = 0; k < projection.coefficients.size(); ++k)
                 for (const auto* values : {&projection.coefficients, &projection.se, &projection.bias})
                     out.write(reinterpret_cast<const char*>(&(*values)[k]), sizeof(double));
+            return described;
         });
 }
 

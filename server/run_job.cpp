@@ -117,11 +117,17 @@ void write_outputs(const LoadedJob& loaded, BrdfResult& result, const std::vecto
 
 bool is_result_of(const std::string& path, const std::string& job_hash) {
     // The header of an OpenEXR file lists thousands of channels before it comes to "job_hash".
-    std::string head(size_t{2} << 20, '\0');
+    constexpr std::streamsize looked_at = 2 << 20;
     std::ifstream in(path, std::ios::binary);
-    in.read(head.data(), static_cast<std::streamsize>(head.size()));
-    head.resize(static_cast<size_t>(std::max<std::streamsize>(in.gcount(), 0)));
-    return head.find(job_hash) != std::string::npos;
+    const auto is_next = [&] {
+        std::string bytes(looked_at, '\0');
+        in.read(bytes.data(), looked_at);
+        bytes.resize(static_cast<size_t>(std::max<std::streamsize>(in.gcount(), 0)));
+        return bytes.find(job_hash) != std::string::npos;
+    };
+    if (is_next()) return true;
+    if (!in || !in.seekg(-looked_at, std::ios::end)) return false;  // there was no more
+    return is_next();
 }
 
 }  // namespace gonio

@@ -44,9 +44,9 @@ std::vector<OutputRequest> output_files(const LoadedJob& loaded, const std::stri
 // made. The report then says how well the projection fits.
 void write_outputs(const LoadedJob& loaded, BrdfResult& result, const std::vector<OutputRequest>& outputs);
 
-// Whether `path` is a result of this very job: its head carries the hash. Files are renamed into place whole,
-// so a head that is there stands for the whole file; and 64 hex digits do not appear by chance, so that no
-// format needs a reader for this.
+// Whether `path` is a result of this very job: its head carries the hash, or (.npy) its end. Files are
+// renamed into place whole, so a head that is there stands for the whole file; and 64 hex digits do not
+// appear by chance, so that no format needs a reader for this.
 bool is_result_of(const std::string& path, const std::string& job_hash);
 
 }  // namespace gonio

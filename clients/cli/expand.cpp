@@ -15,10 +15,12 @@ void add_expand(CLI::App& app, CommonOptions& common, Action& action) {
     CLI::App* command = app.add_subcommand("expand", "Write the images of a factored BTF");
     command->footer(
         "  gonio expand lava.btf -o lava.images\n"
-        "The same bytes as the output {\"format\": \"images\"} of the job (server/README.md).");
+        "  gonio expand lava.btf -o lava.npy\n"
+        "The same bytes as the output {\"format\": \"images\"} or \"npy\" of the job (server/README.md).");
     const auto factored = std::make_shared<std::string>(), images = std::make_shared<std::string>();
     command->add_option("FILE", *factored, "Factored BTF, an output of format btf")->required();
-    command->add_option("-o,--output", *images, "File to write (default: its name with .images)");
+    command->add_option("-o,--output", *images,
+                        "File to write; .npy: for NumPy (default: its name with .images)");
     command->add_flag("-q,--quiet", common.quiet, "Print nothing but errors on stderr");
     command->callback([factored, images, &common, &action] {
         action = [factored, images, &common] {
@@ -28,7 +30,8 @@ void add_expand(CLI::App& app, CommonOptions& common, Action& action) {
             monitor.cancel_requested = &interrupt_requested();
             ProgressBar bar(common.quiet);
             monitor.on_progress = [&](const Progress& progress) { bar.update(progress); };
-            expand_btf(*factored, *images, monitor);
+            const bool is_npy = std::filesystem::path(*images).extension() == ".npy";
+            expand_btf(*factored, is_npy ? ImageForm::npy : ImageForm::arrays, *images, monitor);
             if (!common.quiet) std::cerr << "wrote " << *images << std::endl;
             return 0;
         };

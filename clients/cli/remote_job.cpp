@@ -91,11 +91,12 @@ int execute_remotely(const std::string& path, const RemoteOptions& remote, const
             write_file_atomically(target,
                                   [&](std::ostream& out) { service.fetch(id, product, format, out); });
         };
-        if (output.format == "images" && service.has(id, product, "btf")) {  // a twentieth of the bytes
+        const auto form = image_form(output.format);
+        if (form && service.has(id, product, "btf")) {  // a twentieth of the bytes
             const TemporaryFolder folder;
             const std::string factored = (folder.path() / "factored").string();
             fetch_to(factored, "btf");
-            expand_btf(factored, file.lexically_normal().string(), {{}, &interrupt_requested()});
+            expand_btf(factored, *form, file.lexically_normal().string(), {{}, &interrupt_requested()});
         } else {
             fetch_to(file.lexically_normal().string(), output.format);
         }

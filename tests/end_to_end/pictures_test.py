@@ -39,6 +39,14 @@ def read(path):
     return head, {a["name"]: np.memmap(path, a["dtype"], "r", a["offset"], tuple(a["shape"])) for a in head["arrays"]}
 
 
+def read_npy(path):
+    """Its array, and what its last line says."""
+    array = np.load(path, mmap_mode="r")
+    with open(path, "rb") as file:
+        file.seek(array.offset + array.nbytes)
+        return array, json.load(file)
+
+
 class Pictures(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="gonio_pictures_"))
@@ -59,10 +67,11 @@ class Pictures(unittest.TestCase):
 
     def test_expanding_gives_the_images_to_the_last_bit(self):
         for members, albedo in (({}, 0.8), ({"pixels": [20, 36], "pixel_samples": 3, "plane": "zero"}, [0.9, 0.5, 0.1])):
-            outputs = [{"format": name, "path": f"a.{name}"} for name in ("btf", "images", "png", "csv")]
+            outputs = [{"format": name, "path": f"a.{name}"} for name in ("btf", "images", "npy", "png", "csv")]
             self.run_job(job(btf(**members), albedo, output=outputs))
             self.gonio("expand", "a.btf", "-o", "b.images", "-q")
             self.assertEqual((self.folder / "a.images").read_bytes(), (self.folder / "b.images").read_bytes())
+            self.gonio("expand", "a.btf", "-o", "b.npy", "-q")
             self.gonio("expand", "a.btf", "-q")
             self.assertEqual((self.folder / "a.images").read_bytes(), (self.folder / "b.images").read_bytes())
 
@@ -73,6 +82,9 @@ class Pictures(unittest.TestCase):
             self.assertEqual(head["job_hash"], factored_head["job_hash"])
             if not members:  # four views of few pixels hardly share anything
                 self.assertLess(len((self.folder / "a.btf").read_bytes()), 0.6 * len((self.folder / "a.images").read_bytes()))
+            # For NumPy: the same halves, and the same words and small arrays behind them.
+            self.assertEqual((self.folder / "a.npy").read_bytes(), (self.folder / "b.npy").read_bytes())
+            self.check_npy("a.npy", "a.images")
             # The factored form as anyone would read it.
             maps = factored["view_maps"]
             values = np.asarray(factored["facet_radiance"], np.float32)[:, :, maps[2]].mean(axis=2).swapaxes(0, 1)
@@ -84,6 +96,30 @@ class Pictures(unittest.TestCase):
             self.assertEqual(len(rows), 1 + 81 * 4)
             self.assertTrue((arrays["mean_se"] >= 0).all() and (arrays["pixel_se"] > 0).all())
             self.assertTrue((self.folder / "a.png").read_bytes().startswith(b"\x89PNG"))
+
+    def check_npy(self, npy, images):
+        """Bit by bit, also of what the numbers are."""
+        head, arrays = read(self.folder / images)
+        array, said = read_npy(self.folder / npy)
+        self.assertEqual(array.dtype, np.dtype("<f2"))
+        np.testing.assert_array_equal(array.view(np.uint16), arrays["images"].view(np.uint16))
+        for name in ("mean", "mean_se", "mean_bias", "pixel_se"):
+            np.testing.assert_array_equal(np.asarray(said.pop(name), np.float32), arrays[name])
+        self.assertEqual(said.pop("axes"), ["view", "light", "channel", "row", "column"])
+        self.assertEqual(said.pop("mean_axes"), ["channel", "light", "view"])
+        self.assertEqual(said, {name: value for name, value in head.items() if name != "arrays"})
+
+    def test_a_batch_finds_a_long_npy(self):
+        # Its provenance stands behind the numbers.
+        document = job(btf(outgoing={"theta_deg": [0, 60], "phi_deg": [0, 90, 180, 270]}), output=[{"format": "npy", "path": "a.npy"}])
+        (self.folder / "jobs").mkdir()
+        (self.folder / "jobs/a.json").write_text(json.dumps(document))
+        self.gonio("batch", "jobs", "-o", self.folder)
+        self.assertGreater((self.folder / "a.npy").stat().st_size, 2 << 20)
+        self.assertIn("a.json: skipped", self.gonio("batch", "jobs", "-o", self.folder).stderr)
+        document["accuracy"] = {"samples": {"directions": 17, "replicates": 2}}
+        (self.folder / "jobs/a.json").write_text(json.dumps(document))
+        self.assertIn("a.json: done", self.gonio("batch", "jobs", "-o", self.folder).stderr)
 
     def test_light_field_of_far_cameras_is_that_of_directions(self):
         # Cameras above the middle at a great height see the pixels from straight above.
@@ -103,7 +139,7 @@ class Pictures(unittest.TestCase):
     def test_light_field_under_an_environment(self):
         for name, view in (("sky", {"outgoing": {"list_deg": [[0, 0], [50, 20]]}}), ("near", {"cameras": {"count": [2, 1], "width": "20 um", "height": "60 um"}})):
             document = job({"kind": "light_field", "pixels": [24, 24], "pixel_samples": 4, **view}, 1, environment={"radiance": 3},
-                           accuracy={"samples": {"directions": 64, "replicates": 4}}, output=[{"format": form, "path": f"{name}.{form}"} for form in ("btf", "images", "png")])
+                           accuracy={"samples": {"directions": 64, "replicates": 4}}, output=[{"format": form, "path": f"{name}.{form}"} for form in ("btf", "images", "npy", "png")])
             self.run_job(document)
             head, arrays = read(self.folder / f"{name}.btf")
             self.assertAlmostEqual(head["irradiance"][0], 3 * np.pi, places=5)
@@ -113,10 +149,12 @@ class Pictures(unittest.TestCase):
             np.testing.assert_allclose(head["irradiance"][0] * arrays["mean"], 3, rtol=0.01)
             self.gonio("expand", f"{name}.btf", "-o", "expanded")
             self.assertEqual((self.folder / "expanded").read_bytes(), (self.folder / f"{name}.images").read_bytes())
+            self.check_npy(f"{name}.npy", f"{name}.images")
             self.assertTrue((self.folder / f"{name}.png").read_bytes().startswith(b"\x89PNG"))
         self.assertIn("/base", self.run_job({**document, "base": {"kappa_1": 10}}, code=3).stderr)
         document["material"] = {"model": "ggx", "alpha": 0.4, "reflectance": 1}
-        self.run_job({**document, "output": [{"format": "images", "path": "glossy"}, {"format": "png", "path": "glossy.png"}]})
+        self.run_job({**document, "output": [{"format": form, "path": f"glossy{ending}"} for form, ending in (("images", ""), ("npy", ".npy"), ("png", ".png"))]})
+        self.check_npy("glossy.npy", "glossy")
         head, arrays = read(self.folder / "glossy")
         self.assertEqual(arrays["images"].shape, (2, 1, 1, 24, 24))
         self.run_job({**document, "measure": {"kind": "relight", "outgoing": {"list_deg": [[0, 0]]}}, "output": [{"format": "json", "path": "whole"}]})
@@ -172,10 +210,11 @@ class Pictures(unittest.TestCase):
         refused = self.run_job({**job(pictures, output=[{"format": "btf", "path": "a.btf"}]), "material": ggx}, code=3)
         self.assertIn("images", refused.stderr)
         self.assertEqual(self.left(), [])
-        outputs = [{"format": name, "path": f"a.{name}"} for name in ("images", "png", "json")]
+        outputs = [{"format": name, "path": f"a.{name}"} for name in ("npy", "images", "png", "json")]
         for kind in (pictures, {**{k: v for k, v in pictures.items() if k != "outgoing"}, "kind": "light_field",
                                 "cameras": {"count": [2, 1], "width": "20 um", "height": "40 um"}}):
-            self.run_job({**job(kind, output=outputs[:2 if "cameras" in kind else 3]), "material": ggx})
+            self.run_job({**job(kind, output=outputs[:3 if "cameras" in kind else 4]), "material": ggx})
+            self.check_npy("a.npy", "a.images")
             head, arrays = read(self.folder / "a.images")
             self.assertEqual(head["transport"], "pair graph")
             images = np.asarray(arrays["images"], np.float64)
@@ -209,6 +248,30 @@ class Pictures(unittest.TestCase):
         process.send_signal(signal.SIGINT)
         self.assertEqual(process.wait(30), 130)
         self.assertEqual(self.left(), [])
+
+    def test_no_part_of_a_streamed_file_has_its_name(self):
+        # Glossy pictures are written while they are computed: stopped, or killed, in the midst of that.
+        document = {**job(btf(outgoing={"bonn": 81}), surface=dict(RELIEF, samples=96), accuracy={"samples": {"directions": 64, "replicates": 2}},
+                          output=[{"format": "npy", "path": "a.npy"}, {"format": "images", "path": "a.images"}]),
+                    "material": {"model": "ggx", "alpha": 0.3, "reflectance": 0.9}}
+        path = self.folder / "job.json"
+        path.write_text(json.dumps(document))
+        for sent, code in ((signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)):
+            process = subprocess.Popen([GONIO, "run", path, "-o", self.folder], stderr=subprocess.DEVNULL)
+            deadline = time.monotonic() + 60
+            while not any(p.name.startswith(".a.npy") and p.stat().st_size > 4 << 20 for p in self.folder.iterdir()):
+                self.assertIsNone(process.poll())
+                self.assertLess(time.monotonic(), deadline)
+                time.sleep(0.02)
+            process.send_signal(sent)
+            self.assertEqual(process.wait(30), code)
+            left = self.left()
+            self.assertEqual(left if sent == signal.SIGINT else [name for name in left if not name.endswith(".tmp")], [])
+
+    def test_a_full_disk_is_an_error(self):
+        for material in (job({})["material"], {"model": "ggx", "alpha": 0.3, "reflectance": 0.9}):
+            result = self.run_job({**job(btf(outgoing={"list_deg": [[0, 0]]}), output=[{"format": "npy", "path": "/dev/full"}]), "material": material}, code=1)
+            self.assertIn("/dev/full", result.stderr)
 
     def test_shards_and_the_path_tracer_are_for_tables(self):
         (self.folder / "job.json").write_text(json.dumps(job(btf())))

@@ -36,8 +36,8 @@ class Remote(Service):
     def test_run_writes_the_same_pictures(self):
         lights = {"list_deg": [[30, 0], [60, 90]]}
         btf, matte, glossy = {"kind": "btf", "incident": lights, "outgoing": lights}, JOB["material"], {"model": "ggx", "alpha": 0.4, "metal": "Al"}
-        for material, measure, formats in ((matte, btf, ("btf", "images", "png", "csv")), (glossy, btf, ("images", "png", "csv")),
-                                           (glossy, {**btf, "kind": "light_field"}, ("images", "png")),
+        for material, measure, formats in ((matte, btf, ("btf", "images", "npy", "png", "csv")), (glossy, btf, ("images", "npy", "png", "csv")),
+                                           (glossy, {**btf, "kind": "light_field"}, ("images", "npy", "png")),
                                            (matte, {"kind": "maps", "incident": lights}, ("arrays", "png")),
                                            (glossy, {"kind": "maps", "incident": lights}, ("arrays", "npy"))):
             self.write({**JOB, "material": material, "measure": measure, "accuracy": {"samples": {"directions": 16, "replicates": 2}}}, [{"format": name, "path": f"a.{name}"} for name in formats])

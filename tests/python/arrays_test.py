@@ -1,4 +1,6 @@
 """BTFs, light fields and maps: the same from a server and from the program, read as arrays."""
+import json
+
 import gonio
 import numpy as np
 from support import GONIO, MATERIAL, SURFACE, ServiceTest
@@ -15,14 +17,27 @@ class Files(ServiceTest):
         self.assertEqual(job.last.info["processID"], "btf")
         factored = gonio.read_arrays(job.fetch(self.folder / "a.btf", "btf"))
         self.assertTrue(job.read("btf", "png").startswith(b"\x89PNG"))
-        paths = gonio.run_files(self.folder, BTF, program=GONIO,
-                                output=[{"format": "images", "path": "b.images"}, {"format": "btf", "path": "b.btf"}])
+        paths = gonio.run_files(self.folder, BTF, program=GONIO, output=[{"format": form, "path": f"b.{form}"} for form in ("images", "btf")])
         images = gonio.read_arrays(paths[0])
         self.assertEqual(images["images"].shape, (81, 2, 1, 1, 16))
         self.assertEqual(images.head["job_hash"], factored.head["job_hash"])
         for view in (0, 40, 80):
             np.testing.assert_array_equal(factored.images(view), images.images(view))
         self.assertEqual((self.folder / "a.btf").read_bytes(), paths[1].read_bytes())
+
+    def test_images_are_saved_as_the_program_writes_them(self):
+        for samples, material, forms in ((3, MATERIAL, ("btf", "images")), (1, {"model": "ggx", "alpha": 0.4, "reflectance": 0.9}, ("images",))):
+            document = {**BTF, "material": material, "measure": {**BTF["measure"], "pixel_samples": samples, "outgoing": LIGHTS}}
+            *paths, program = gonio.run_files(self.folder, document, program=GONIO, output=[{"format": form, "path": f"b.{form}"} for form in (*forms, "npy")])
+            for path in paths:
+                saved = gonio.read_arrays(path).save_images(self.folder / "saved.npy")
+                np.testing.assert_array_equal(np.load(saved).view(np.uint16), np.load(program).view(np.uint16))
+                np.testing.assert_array_equal(gonio.read_arrays(path).images(1), np.load(program)[1])
+                said, expected = (json.loads(file.read_bytes().rsplit(b"\n", 2)[-2]) for file in (saved, program))
+                self.assertEqual(said, expected)
+            self.assertEqual([path.name for path in self.folder.glob(".*")], [])
+        job = gonio.Client(self.service.url).submit(document).wait(120)
+        np.testing.assert_array_equal(np.load(job.fetch(self.folder / "served.npy", "btf")), np.load(program))
 
     def test_maps_and_light_fields_of_a_server(self):
         client = gonio.Client(self.service.url)

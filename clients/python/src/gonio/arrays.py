@@ -20,7 +20,7 @@ class Arrays:
     """What a file of arrays holds.
 
     head: what the numbers are, axes, units, errors in words, provenance. arrays: by name, mapped from the file and read
-    where they are looked at; numpy.save(path, a["images"]) makes a .npy of one.
+    where they are looked at.
     """
 
     head: dict[str, Any]
@@ -30,12 +30,47 @@ class Arrays:
         return self.arrays[name]
 
     def images(self, view: int) -> npt.NDArray[np.float32]:
-        """Of a BTF or light field in either form: [light, channel, row, column] of one view, in 1/sr, row 0 at low y."""
+        """Of a BTF or light field in either form: [light, channel, row, column] of one view, in 1/sr, row 0 at low y.
+
+        Both forms give the same values.
+        """
+        return self._halves(view).astype(np.float32)
+
+    def save_images(self, path: str | os.PathLike[str]) -> Path:
+        """Writes all images of a BTF or light field in either form as .npy, whole or not at all, and returns the path.
+
+        Half floats [view, light, channel, row, column] in 1/sr, one view after the other: the array of the job's
+        output "npy", and its last line, which says what the numbers are.
+        """
+        target = Path(path)
+        part = target.with_name(f".{target.name}.{os.getpid()}.part")
+        first = self._halves(0)
+        header = {"descr": first.dtype.str, "fortran_order": False, "shape": (self.head["n_views"], *first.shape)}
+        said = {"axes": ["view", "light", "channel", "row", "column"], "mean_axes": ["channel", "light", "view"]}
+        errors = {name: self.arrays[name].tolist() for name in ("mean", "mean_se", "mean_bias", "pixel_se")}
+        write_header: Any = np.lib.format.write_array_header_1_0  # untyped in some versions of NumPy
+        try:
+            with open(part, "wb") as file:
+                write_header(file, header)
+                for view in range(self.head["n_views"]):
+                    file.write(np.ascontiguousarray(self._halves(view)).data)
+                file.write(f"\n{json.dumps(said | errors | self.head | {'form': 'images'})}\n".encode())
+                file.flush()
+                os.fsync(file.fileno())
+            os.replace(part, target)
+        except BaseException:
+            part.unlink(missing_ok=True)
+            raise
+        return target
+
+    def _halves(self, view: int) -> npt.NDArray[np.float16]:
         if "images" in self.arrays:
-            return np.asarray(self.arrays["images"][view], np.float32)
+            return np.asarray(self.arrays["images"][view], np.float16)
         radiance, maps = self.arrays["facet_radiance"], self.arrays["view_maps"][view]
-        values = np.asarray(radiance[:, :, maps], np.float32).mean(axis=2)
-        return np.ascontiguousarray(values.swapaxes(0, 1))
+        total = np.zeros((*radiance.shape[:2], *maps.shape[1:]), np.float32)
+        for seen in maps:  # in the order of the program, whose rounding this is
+            total += radiance[:, :, seen]
+        return (total * (np.float32(1) / np.float32(len(maps)))).astype(np.float16).swapaxes(0, 1)
 
 
 def read_arrays(path: str | os.PathLike[str]) -> Arrays:
