@@ -10,7 +10,6 @@
 #include "measure/btf_views.h"
 #include "measure/describe.h"
 #include "measure/glossy_pixels.h"
-#include "measure/glossy_sky.h"
 #include "measure/glossy_sky_pictures.h"
 #include "measure/mesh_bias.h"
 #include "measure/run_limit.h"
@@ -21,7 +20,6 @@ namespace {
 constexpr int fewest_runs = 2, most_runs = 32, most_probes = 4, more_places = 4;
 
 Accuracy::Samples samples_of(const BtfPlan& plan) {
-    if (plan.incident.empty()) return sky_pictures_samples(plan);
     return plan.accuracy.samples.value_or(Accuracy::Samples{4, 64, 1, fewest_runs});
 }
 
@@ -254,6 +252,7 @@ GlossyBtf::GlossyBtf(const HeightField& surface, const Material& material, const
                             : std::make_unique<Measurement>(surface, material, plan, options, monitor)) {}
 
 Prediction predict_glossy_btf(const HeightField& surface, const Material& material, const BtfPlan& plan) {
+    if (plan.incident.empty()) return predict_sky_pictures(surface, material, plan);
     const Accuracy::Samples samples = samples_of(plan);
     const BtfShape shape = btf_shape(surface, material, plan, samples.refinement);
     const double facets = static_cast<double>(shape.n_facets), lights = shape.n_lights,
@@ -265,18 +264,11 @@ Prediction predict_glossy_btf(const HeightField& surface, const Material& materi
         0.05 + seen * (5e-9 + 4e-9 * samples.replicates) +
         samples.replicates * facets *
             (1e-6 + 20e-9 * lights * samples.sub_samples + 2e-9 * channels * lights * samples.directions);
-    if (plan.incident.empty())
-        prediction.cpu_seconds =
-            0.05 + samples.replicates * GlossySky::run_seconds(surface, samples, shape.n_channels,
-                                                               plan.azimuths,
-                                                               static_cast<double>(shape.maps_size()));
     if (plan.accuracy.max_seconds)
         prediction.cpu_seconds = std::min(prediction.cpu_seconds, *plan.accuracy.max_seconds);
     prediction.memory_bytes = (64 << 20) +
                               samples.replicates * glossy_run_bytes(shape, samples, surface.base) +
                               2.0 * static_cast<double>(shape.images_size()) / shape.n_views;
-    if (plan.incident.empty())
-        prediction.memory_bytes = (64 << 20) + sky_pictures_bytes(surface, shape, samples);
     prediction.table_bytes = 2.0 * static_cast<double>(shape.images_size());
     return prediction;
 }

@@ -22,7 +22,7 @@ class GlossyPictures {
 class GlossyBtf {
   public:
     // All but the pictures: the light of as many random runs as the accuracy needs, judged by a few views.
-    // environment: as of measure_btf; then all pictures are made at once. The references must outlive it.
+    // environment: as of measure_btf. The references must outlive it.
     // Throws Error: for mirrors, for cameras over curved bases, and for an environment on one; limit;
     // cancelled.
     GlossyBtf(const HeightField& surface, const Material& material, const BtfPlan& plan,

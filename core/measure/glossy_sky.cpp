@@ -152,8 +152,9 @@ Radiances GlossySky::direct(const SubSample& place, const Receivers& receivers) 
     Radiances radiances(n_channels(), std::vector<float>(receivers.count, 0.0f));
     const double share = 1.0 / static_cast<double>(places_.size());
     // What a facet sees along a direction sends its light back along it.
+    const bool lights_pairs = indirect_ && arriving_.empty();
     const Receivers pairs{
-        indirect_ ? graph_.size() : 0, [&](size_t first, size_t count, SeenParts& out) {
+        lights_pairs ? graph_.size() : 0, [&](size_t first, size_t count, SeenParts& out) {
             for (size_t k = 0; k < count; ++k) {
                 const uint32_t d = graph_.direction[first + k];
                 out.set(k, graph_.seen[first + k],
@@ -178,7 +179,7 @@ Radiances GlossySky::direct(const SubSample& place, const Receivers& receivers) 
                 .resize(lit.directions.padded(), 0.0f);
         }
         add_direct(lit, 1.0, receivers, radiances);
-        if (!indirect_) continue;
+        if (!lights_pairs) continue;
         add_direct(lit, share, pairs, first_);
         const std::vector<float> ones(lit.directions.padded(), 1.0f);
         for (size_t u = 0; u < tile_.n_unknowns(); ++u) {

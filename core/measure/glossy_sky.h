@@ -43,7 +43,8 @@ class GlossySky {
     const std::vector<SubSample>& places() const { return places_; }  // of the run that was started
     // The first order at one of them, inside each part.
     Radiances direct(const SubSample& place, const Receivers& receivers);
-    // The orders beyond, evenly from each part. After direct() of every place of the run.
+    // The orders beyond, evenly from each part. After direct() of every place of the run; from then on both
+    // may be asked for other receivers, under the same light.
     Radiances indirect(const Receivers& receivers);
 
     bool has_indirect() const { return indirect_; }

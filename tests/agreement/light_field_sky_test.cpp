@@ -1,6 +1,7 @@
 // Light fields under an environment: the radiances that relight finds, and what the path tracer sees.
 #include "agreement/measured.h"
 #include "agreement/traced_sky.h"
+#include "base/error.h"
 #include "base/half.h"
 #include "measure/glossy_btf.h"
 #include "measure/relight.h"
@@ -110,12 +111,11 @@ Material ggx(double alpha, double reflectance = 0.9) {
 }
 struct Pictures {
     Btf btf;
+    Report report;
     std::vector<std::vector<float>> images;  // [view], [channel][pixel]
 };
 Pictures glossy(const HeightField& surface, const Material& material, const BtfPlan& plan,
-                const Environment& sky, int n_threads = 1) {
-    RunOptions options;
-    options.n_threads = n_threads;
+                const Environment& sky, const RunOptions& options = {}) {
     const Monitor monitor;
     GlossyBtf measured(surface, material, plan, options, monitor, &sky);
     Pictures pictures;
@@ -123,6 +123,7 @@ Pictures glossy(const HeightField& surface, const Material& material, const BtfP
         auto& values = pictures.images.emplace_back();
         for (const uint16_t half : images) values.push_back(from_half_bits(half));
     });
+    pictures.report = measured.report();
     return pictures;
 }
 
@@ -201,10 +202,52 @@ TEST(GlossyLightFieldUnderASky, SameBitsForAnyNumberOfThreads) {
     BtfPlan plan = plan_of_views(2);
     plan.pixel_samples = 2;
     const Pictures a = glossy(field(), ggx(0.3), plan, test::uneven_sky()),
-                   b = glossy(field(), ggx(0.3), plan, test::uneven_sky(), 4);
+                   b = glossy(field(), ggx(0.3), plan, test::uneven_sky(), {.n_threads = 4});
     EXPECT_EQ(a.images, b.images);
     EXPECT_EQ(a.btf.mean.f, b.btf.mean.f);
     EXPECT_EQ(a.btf.pixel_se, b.btf.pixel_se);
+}
+
+double counter(const Report& report, const std::string& name) {
+    for (const auto& [key, value] : report.counters)
+        if (key == name) return value;
+    return -1;
+}
+
+// With memory for all views, for three and for one: as many runs, of the same pictures.
+TEST(GlossyLightFieldUnderASky, SameBitsInAnyNumberOfBlocks) {
+    const HeightField surface = generate_gaussian(32, 32, 1, 6, 0.8, 4);
+    const Material material{{"r", "g", "b"}, ggx(0.3).lobes[0].lobe};
+    const Environment sky = in_colour(test::uneven_sky());
+    BtfPlan plan;
+    plan.pixel_samples = 3;
+    plan.azimuths = 8;
+    plan.accuracy.target_relative_error = 0.04;
+    for (int k = 0; k < 7; ++k) plan.outgoing.push_back({10.0 * k, 50.0 * k});
+    const double bytes = predict_btf(surface, material, plan).memory_bytes - (64 << 20);
+    BtfPlan with_another = plan;
+    with_another.outgoing.push_back({70, 0});
+    const double view = predict_btf(surface, material, with_another).memory_bytes - (64 << 20) - bytes;
+    const auto in_memory_for = [&](double n_views) {
+        RunOptions options;
+        options.max_bytes = std::llround(bytes - (7 - n_views) * view);
+        return glossy(surface, material, plan, sky, options);
+    };
+    const Pictures whole = glossy(surface, material, plan, sky);
+    EXPECT_EQ(counter(whole.report, "view_blocks"), 1);
+    EXPECT_GT(whole.report.relative_error, 0);
+    for (const int together : {3, 1}) {
+        const Pictures cut = in_memory_for(together + 0.5);
+        EXPECT_EQ(counter(cut.report, "view_blocks"), together == 3 ? 3 : 7);
+        EXPECT_EQ(cut.images, whole.images);
+        EXPECT_EQ(cut.btf.mean.f, whole.btf.mean.f);
+        EXPECT_EQ(cut.btf.mean.se, whole.btf.mean.se);
+        EXPECT_EQ(cut.btf.mean.bias, whole.btf.mean.bias);
+        EXPECT_EQ(cut.btf.pixel_se, whole.btf.pixel_se);
+        EXPECT_EQ(cut.report.settings, whole.report.settings);
+        EXPECT_EQ(cut.report.relative_error, whole.report.relative_error);
+    }
+    EXPECT_THROW(in_memory_for(0.9), Error);
 }
 
 }  // namespace
