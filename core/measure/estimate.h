@@ -27,6 +27,7 @@ struct Estimate {
     // Relative to max(f, 0.01 mean f), rms over rows and channels: standard error and bias together, each
     // alone, and the standard error of the direct part of channel 0.
     double total = 0, random = 0, systematic = 0, direct = 0;
+    double rare = 0;  // part of `systematic`: what too few samples meet; more of them take it away
 };
 
 // Stages on the mesh of the last one are independent estimates of the same values: they are averaged,

@@ -97,7 +97,7 @@ RunForecast forecast_graph(const MeasuredScene& scene, const RunSettings& settin
     const double parts = settings.refinement * settings.refinement,
                  groups = static_cast<double>(channel_groups(*scene.material).size()),
                  rays = s.facets * settings.directions / 9 / parts,
-                 pairs = s.indirect ? rays * std::min(0.35, 0.1 + 0.08 * s.slope) : 0.0,
+                 pairs = s.indirect ? rays * share_that_hits(s.slope) : 0.0,
                  values = s.facets * s.lights * s.views * (s.same ? 0.5 : 1.0);
     const double total_share = reflected_share(*scene.material);
     double per_value = 0, per_row = 0, direct = 0, indirect = 0;

@@ -6,8 +6,10 @@
 
 #include "material/lobe_shape.h"
 #include "measure/blocks.h"
+#include "measure/planning.h"
 #include "measure/windows.h"
 #include "scattering/glossy_direct.h"
+#include "scattering/sampled_orders.h"
 #include "scattering/turned_light.h"
 
 namespace gonio {
@@ -53,11 +55,13 @@ struct Sums {
 
 class BlockRun {
   public:
+    // number: of the run.
     BlockRun(const GraphContext& context, const RunSettings& settings, const RunShifts& shifts,
-             const Block& block, int n_threads, const Monitor& monitor)
+             uint64_t number, const Block& block, int n_threads, const Monitor& monitor)
         : context_(context),
           settings_(settings),
           shifts_(shifts),
+          number_(number),
           block_(block),
           n_threads_(n_threads),
           monitor_(monitor) {
@@ -75,8 +79,16 @@ class BlockRun {
         double clock = thread_seconds();
         add_direct_light(tile, materials, lights, views, values);
         values.seconds_direct += thread_seconds() - clock;
-        if (context_.transports()) add_orders(tile, materials, lights, block_.same ? lights : views, values);
+        if (context_.transports()) {
+            const Side& to = block_.same ? lights : views;
+            const int max_order = context_.plan->max_order,
+                      sampled = first_sampled_order(context_, tile, settings_.directions);
+            if (sampled != 2) add_orders(tile, materials, lights, to, sampled == 3 ? 2 : max_order, values);
+            if (sampled > 0 && (max_order == 0 || max_order >= sampled))
+                add_sampled_orders(tile, materials, lights, to, sampled, values);
+        }
         sums_.core_area += tile.core_area();
+        ++tiles_;
     }
 
     const Sums& sums() const { return sums_; }
@@ -125,7 +137,7 @@ class BlockRun {
     }
 
     void add_orders(const Tile& tile, const std::vector<SlotMaterial>& materials, const Side& lights,
-                    const Side& views, RunValues& values) {
+                    const Side& views, int max_order, RunValues& values) {
         double clock = thread_seconds();
         const PairGraph graph = run_pairs(context_, settings_, tile, shifts_, n_threads_, monitor_);
         values.rays += graph.rays;
@@ -135,7 +147,7 @@ class BlockRun {
         values.seconds_links += thread_seconds() - clock;
         clock = thread_seconds();
         GraphOptions options;
-        options.max_order = context_.plan->max_order;
+        options.max_order = max_order;
         options.keep_orders = context_.keep_orders();
         options.tolerance = context_.series_tolerance;
         const GraphSide view_side{views.arrays, &views.visible, 0};
@@ -174,25 +186,60 @@ class BlockRun {
                 values.ratio = std::max(values.ratio, found.ratio);
                 values.remainder = std::max(values.remainder, found.remainder);
                 values.heaviest = std::max(values.heaviest, found.heaviest);
-                std::vector<Matrix>& sums = sums_.orders[g];
-                sums.resize(std::max(sums.size(), found.orders.size()));
-                for (size_t k = 0; k < found.orders.size(); ++k) {
-                    if (sums[k].values.empty()) sums[k] = Matrix(lights.arrays.n, views.arrays.n);
-                    for (int l = 0; l < n; ++l)
-                        for (int v = 0; v < views.arrays.n; ++v)
-                            sums[k](first + l, v) += found.orders[k](l, v);
-                }
+                for (size_t k = 0; k < found.orders.size(); ++k)
+                    add(found.orders[k], first, lights.arrays.n, sums_.orders[g], k);
             }
         }
+        values.seconds_series += thread_seconds() - clock;
+    }
+
+    // Rows of lights from `first` on, to the k-th of the orders that are kept apart, or of their sum.
+    static void add(const Matrix& order, int first, int n_lights, std::vector<Matrix>& sums, size_t k) {
+        sums.resize(std::max(sums.size(), k + 1));
+        if (sums[k].values.empty()) sums[k] = Matrix(n_lights, order.columns);
+        for (int l = 0; l < order.rows; ++l)
+            for (int v = 0; v < order.columns; ++v) sums[k](first + l, v) += order(l, v);
+    }
+
+    void add_sampled_orders(const Tile& tile, const std::vector<SlotMaterial>& materials, const Side& lights,
+                            const Side& views, int first_order, RunValues& values) {
+        const double clock = thread_seconds();
+        if (!trace_grid_) trace_grid_ = make_trace_grid(*context_.surface);
+        SampledScene scene{*context_.surface, *trace_grid_, *context_.material, tile, {}, materials};
+        for (const ChannelGroup& group : context_.channel_groups) scene.channels.push_back(group.channels[0]);
+        SamplingOptions options;
+        options.first_order = first_order;
+        options.max_order = context_.plan->max_order;
+        options.keep_orders = context_.keep_orders();
+        options.tolerance = context_.series_tolerance;
+        options.rays_per_facet = sampled_rays_per_facet(settings_);
+        options.seed = context_.plan->accuracy.seed;
+        options.stream = number_;
+        options.tile_number = tiles_;
+        options.light_numbers = block_.lights;
+        const SampledOrders found =
+            sample_orders(scene, {lights.arrays, &lights.visible}, {views.arrays, &views.visible}, options,
+                          n_threads_, monitor_);
+        for (size_t g = 0; g < found.orders.size(); ++g)
+            for (size_t k = 0; k < found.orders[g].size(); ++k)
+                add(found.orders[g][k], 0, lights.arrays.n, sums_.orders[g],
+                    options.keep_orders ? k + first_order - 2 : 0);
+        values.applications = std::max(values.applications, found.n_orders);
+        values.remainder = std::max(values.remainder, found.remainder);
+        values.rays += found.rays;
+        values.dropped += found.rays_lost;
         values.seconds_series += thread_seconds() - clock;
     }
 
     const GraphContext& context_;
     const RunSettings& settings_;
     const RunShifts& shifts_;
+    const uint64_t number_;
     const Block& block_;
     int n_threads_;
     const Monitor& monitor_;
+    std::optional<TraceGrid> trace_grid_;  // made when it is needed
+    uint64_t tiles_ = 0;                   // so far
     Sums sums_;
 };
 
@@ -254,7 +301,12 @@ double graph_run_bytes(const GraphContext& context, const RunSettings& settings,
     const double sides = 8 * unknowns * (n_lights + n_views + 32),
                  pairs = unknowns * settings.directions / (s.base.corrects_horizons() ? 1.0 : 9.0) * 0.35,
                  turned = s.base.is_curved() ? 8 * unknowns * light_block + sizeof(PairBend) * pairs : 0;
-    return sides + turned + 20 * pairs +
+    // Rays along lobes may meet any cell of the surface; most_honest_share at the largest subset of facets.
+    const double slope = context.grid->max_slope,
+                 share = highest_peak(*context.material) * 4 * pi * slope / std::sqrt(1 + slope * slope) * 9 *
+                         settings.refinement * settings.refinement / settings.directions,
+                 traced = share > most_honest_share ? 24.0 * s.nx * s.ny : 0.0;
+    return sides + turned + traced + 20 * pairs +
            scatter_bytes(pairs, std::min(n_lights * turned_coefficients(s.base), light_block), n_views) +
            16.0 * 2 * n_lights * n_views * static_cast<double>(context.channel_groups.size());
 }
@@ -264,6 +316,21 @@ double lobe_share_of_pair(const Material& material, const MarchGrid& grid, const
     const double slope = grid.max_slope, z_max = slope / std::sqrt(1 + slope * slope);
     return highest_peak(material) * 4 * pi * z_max / n_directions *
            facet_subset(tile, grid.base, n_directions) * tile.n_parts();
+}
+
+int first_sampled_order(const MeasuredScene& scene, const Tile& tile, int n_directions) {
+    if (scene.surface->base.is_curved()) return 0;
+    const double share = lobe_share_of_pair(*scene.material, *scene.grid, tile, n_directions);
+    return share > most_share_of_order_2 ? 2 : share > most_honest_share ? 3 : 0;
+}
+
+double sampled_rays_per_facet(const RunSettings& settings) {
+    return settings.directions / 256.0;
+}
+
+double pairs_per_facet(const HeightField& surface, const Tile& tile, int n_directions) {
+    return n_directions * share_that_hits(rms_slope(surface)) /
+           facet_subset(tile, surface.base, n_directions);
 }
 
 PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,
@@ -285,7 +352,9 @@ RunValues graph_run(const GraphContext& context, const RunSettings& settings, in
     values.direct.assign(context.rows(), 0.0f);
     size_t slices = 0;
     for (const Block& block : run_blocks(context, settings)) {
-        BlockRun of_block(context, settings, shifts, block, n_threads, monitor);
+        BlockRun of_block(context, settings, shifts,
+                          static_cast<uint64_t>(stage) << 32 | static_cast<uint32_t>(run), block, n_threads,
+                          monitor);
         for (const Tile& tile : tiles) {
             monitor.check_cancelled();
             of_block.add_tile(tile, values);

@@ -1,5 +1,7 @@
 // One randomised run of the glossy engine: exact direct term, pair graph for the orders beyond.
 #pragma once
+#include <algorithm>
+
 #include "measure/run.h"
 #include "scattering/pair_graph.h"
 
@@ -37,6 +39,20 @@ double lobe_share_of_pair(const Material& material, const MarchGrid& grid, const
 // directions (relief of slope 0.5) 3 stated errors held the truth of order 3 in 96, 90, 84, 77, 72 % where a
 // pair took 1.3 (GGX 0.3), 5, 12, 32, 130; that of order 2 in 100, 99, 99, 96, 86 %, and 49 % at 1200.
 inline constexpr double most_honest_share = 2;
+// And above that, order 2 is better followed by rays, too.
+inline constexpr double most_share_of_order_2 = 16;
+
+// The first order that is followed by rays along lobes (sampled_orders.h) instead of pairs; 0: none. Rays
+// know flat bases only.
+int first_sampled_order(const MeasuredScene& scene, const Tile& tile, int n_directions);
+// Of a light and facet. As many as take about the time of so many directions.
+double sampled_rays_per_facet(const RunSettings& settings);
+
+// Pairs that leave a facet, of so many shared directions; share of rays inside the slab that hit.
+double pairs_per_facet(const HeightField& surface, const Tile& tile, int n_directions);
+inline double share_that_hits(double rms_slope) {
+    return std::min(0.35, 0.1 + 0.08 * rms_slope);
+}
 
 // Shared directions of a run on a tile, and the pairs they give.
 PairGraph run_pairs(const GraphContext& context, const RunSettings& settings, const Tile& tile,

@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "material/facet_brdf.h"
+#include "scattering/lobe_points.h"
 #include "surface/facet_mesh.h"
 #include "visibility/march.h"
 
@@ -60,15 +61,14 @@ class LightTracer {
           n_channels_(scene.material_.channels.size()),
           seed_(seed),
           stream_(stream),
-          counter_((static_cast<uint64_t>(light_number) + 1) << 40) {
+          counter_((static_cast<uint64_t>(light_number) + 1) << 40),
+          points_(random_words(seed, stream, counter_++)) {
         const size_t row = static_cast<size_t>(scene.surface_.nx);
         for (RayBatch* batch : {&rays_, &hits_, &escaped_}) batch->reserve(batch_rays + row);
         weights_.resize((batch_rays + row) * n_channels_);
         factors_.resize(n_channels_);
         tally_.remainder.assign(n_channels_, 0.0);
         chosen_ = chosen_cells();
-        const auto words = random_words(seed_, stream_, counter_++);
-        for (int k = 0; k < 3; ++k) shift_[k] = uniform_double(words[k]);
     }
 
     ForwardTally run(const Monitor& monitor) {
@@ -104,8 +104,7 @@ class LightTracer {
     const size_t n_channels_;
     const uint64_t seed_, stream_;
     uint64_t counter_;
-    double shift_[3];
-    uint64_t started_ = 0;
+    LobePoints points_;
     double received_ = 0,
            expected_ = 0;  // projected area of the lit places; of all cells looked at, in truth
     std::vector<CellRect> chosen_;
@@ -141,9 +140,6 @@ void LightTracer::start_rays(const SubSample& place, int kind, const Monitor& mo
         bundle = make_ray_bundle(scene_.march_, light_, point, max_march_travel);
         tally_.truncated_bundles += bundle.truncated;
     }
-    // R3 (Roberts 2018) over the rays of the light, randomly shifted: neighbouring facets sample their lobes
-    // differently.
-    constexpr double alpha[3] = {0.8191725133961645, 0.6710436067037893, 0.5497004779019703};
     for (const CellRect& rect : chosen_) {
         const size_t words = words_for(rect.width);
         bits_.assign(words * rect.height, ~0u);
@@ -169,11 +165,9 @@ void LightTracer::start_rays(const SubSample& place, int kind, const Monitor& mo
                     received_ += flux;
                     const auto id = static_cast<int32_t>(rays_.n);
                     std::fill_n(&weights_[id * n_channels_], n_channels_, static_cast<float>(flux));
-                    const double k = static_cast<double>(++started_);
+                    const auto dice = points_.next();
                     reflect(kind, i, j, u, v, facet_height(scene_.grid_, kind, i, j, u, v), light_, id,
-                            fractional_part(shift_[0] + k * alpha[0]),
-                            fractional_part(shift_[1] + k * alpha[1]),
-                            fractional_part(shift_[2] + k * alpha[2]));
+                            dice[0], dice[1], dice[2]);
                 }
         }
     }
