@@ -1,36 +1,33 @@
 // Memory for the large arrays that are gathered from at random: 2 MiB pages spare most page faults and
 // address look-ups.
 #pragma once
-#include <sys/mman.h>
-
-#include <cstdlib>
-#include <memory>
+#include <cstddef>
 #include <new>
 #include <utility>
 #include <vector>
 
 namespace gonio {
 
+inline constexpr size_t huge_page = size_t{2} << 20, most_kept_memory = size_t{256} << 20;
+
+// Memory that is given back is kept, up to most_kept_memory bytes of it, for the next array of about its
+// size: every run takes the same ones, and for the kernel to clear fresh pages took a tenth of a run.
+// Throws std::bad_alloc. bytes: what was asked for.
+void* take_huge_pages(size_t bytes);
+void give_back_huge_pages(void* memory, size_t bytes) noexcept;
+
 // Elements of a vector with this allocator start uninitialised: such arrays are always written whole before
 // they are read.
 template <class T>
 struct HugePageAllocator {
     using value_type = T;
-    static constexpr size_t page = size_t{2} << 20;
 
     HugePageAllocator() = default;
     template <class U>
     HugePageAllocator(const HugePageAllocator<U>&) {}
 
-    T* allocate(size_t n) {
-        const size_t bytes = n * sizeof(T), alignment = bytes >= page ? page : 64;
-        void* memory = std::aligned_alloc(alignment, (bytes + alignment - 1) / alignment * alignment);
-        if (!memory) throw std::bad_alloc();
-        if (bytes >= page)
-            madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it everything works, slower
-        return static_cast<T*>(memory);
-    }
-    void deallocate(T* memory, size_t) { std::free(memory); }
+    T* allocate(size_t n) { return static_cast<T*>(take_huge_pages(n * sizeof(T))); }
+    void deallocate(T* memory, size_t n) noexcept { give_back_huge_pages(memory, n * sizeof(T)); }
     template <class U>
     void construct(U* at) {
         ::new (static_cast<void*>(at)) U;

@@ -1,5 +1,7 @@
 // Which transport a job gets: of those that can do it, the one that is foreseen to be done first.
 #pragma once
+#include <memory>
+
 #include "measure/transport.h"
 
 namespace gonio {

@@ -16,14 +16,23 @@ HWY_BEFORE_NAMESPACE();
 namespace gonio {
 namespace HWY_NAMESPACE {
 
-// Factors of all directions for a stretch of slots: [direction][z, s, x, y as needed][direct_chunk].
+// What the loop over pairs of directions reads of one of them, [which][direct_chunk].
+enum Column { cosine, seen, shape_s, shape_x, shape_y };
 template <Shape shape, bool aniso>
-size_t fill_factors(const SlotLobe* lobe, const Tile& tile, const DirectSlots& slots,
-                    const DirectionArrays& directions, std::vector<float>& factors) {
+constexpr size_t n_columns(bool lobe) {
+    return !lobe ? 2 : aniso ? 5 : 3;
+}
+
+// Columns of all directions for a stretch of slots. Of a single sub-sample the cosine is 0 where the facet is
+// not seen, and `seen` is a mask: then no pair has to look at bits.
+template <Shape shape, bool aniso>
+void fill_columns(const SlotLobe* lobe, const Tile& tile, const DirectSlots& slots, const uint32_t* bits,
+                  const DirectionArrays& directions, std::vector<float>& columns) {
     const D d;
-    const size_t lanes = hn::Lanes(d);
-    const size_t n_factors = !lobe ? 1 : aniso ? 4 : 2, size = n_factors * direct_chunk;
-    factors.resize(directions.n * size);
+    const DU du;
+    const size_t lanes = hn::Lanes(d), size = n_columns<shape, aniso>(lobe) * direct_chunk;
+    const bool single = slots.n_sub_samples == 1;
+    columns.resize(directions.n * size);
     for (size_t k = 0; k < slots.count; k += lanes) {
         const size_t at = slots.first + k;
         LobeNumbers numbers;
@@ -35,102 +44,119 @@ size_t fill_factors(const SlotLobe* lobe, const Tile& tile, const DirectSlots& s
         for (int c = 0; c < directions.n; ++c) {
             const VF dx = hn::Set(d, directions.x[c]), dy = hn::Set(d, directions.y[c]),
                      dz = hn::Set(d, directions.z[c]);
-            float* to = &factors[c * size + k];
+            float* to = &columns[c * size + k];
             const VF z = dot(nx, ny, nz, dx, dy, dz);
-            if (!lobe) {
-                hn::StoreU(hn::Max(z, hn::Zero(d)), d, to);
-                continue;
+            const auto none = hn::Eq(hn::LoadU(du, bits + c * direct_chunk + k), hn::Zero(du));
+            const VF mask = hn::BitCast(d, hn::Not(hn::VecFromMask(du, none)));
+            Factors f;
+            f.z = hn::Max(z, hn::Zero(d));
+            if (lobe) {
+                f = factors_of<shape, aniso>(numbers, z, dx, dy, dz);
+                hn::StoreU(is_microfacet(shape) ? hn::Div(f.s, f.z) : f.s, d, to + shape_s * direct_chunk);
+                if constexpr (aniso) {
+                    hn::StoreU(f.x, d, to + shape_x * direct_chunk);
+                    hn::StoreU(f.y, d, to + shape_y * direct_chunk);
+                }
             }
-            const Factors f = factors_of<shape, aniso>(numbers, z, dx, dy, dz);
-            hn::StoreU(f.z, d, to);
-            hn::StoreU(f.s, d, to + direct_chunk);
-            if constexpr (aniso) {
-                hn::StoreU(f.x, d, to + 2 * direct_chunk);
-                hn::StoreU(f.y, d, to + 3 * direct_chunk);
-            }
+            hn::StoreU(single ? hn::And(f.z, mask) : f.z, d, to + cosine * direct_chunk);
+            hn::StoreU(mask, d, to + seen * direct_chunk);
         }
     }
-    return size;
 }
 
 // Views that are worked on side by side: they share what is loaded of light and facet.
 constexpr int abreast = 4;
 
-// How many of the sub-samples' bits are set: of a single one, the bit itself.
-HWY_INLINE VF bit_count(hn::Vec<DU> bits, bool single) {
-    const auto count = single ? bits : hn::PopulationCount(bits);
-    return hn::ConvertTo(D(), hn::BitCast(DI(), count));
-}
-
-// lambert: null if another lobe carries it.
-template <Shape shape, bool aniso, bool fresnel>
+// lambert: null if another lobe carries it. single: of one sub-sample.
+template <Shape shape, bool aniso, bool fresnel, bool single>
 void direct_of_lobe(const SlotLobe* lobe, const float* lambert, const Tile& tile, const DirectSlots& slots,
                     const DirectionArrays& lights, const DirectionArrays& views, bool same,
                     DirectScratch& scratch, double* sums) {
     const D d;
     const DU du;
-    const size_t lanes = hn::Lanes(d);
-    const size_t size = fill_factors<shape, aniso>(lobe, tile, slots, lights, scratch.light_factors);
-    if (!same) fill_factors<shape, aniso>(lobe, tile, slots, views, scratch.view_factors);
-    const float* light_factors = scratch.light_factors.data();
-    const float* view_factors = same ? light_factors : scratch.view_factors.data();
+    const DI di;
+    const size_t lanes = hn::Lanes(d), size = n_columns<shape, aniso>(lobe) * direct_chunk;
     const uint32_t* light_bits = scratch.light_bits.data();
     const uint32_t* view_bits = same ? light_bits : scratch.view_bits.data();
-    const bool single_bit = slots.n_sub_samples == 1;
-    auto factors_at = [&](const float* of, size_t k, VF z) {
+    fill_columns<shape, aniso>(lobe, tile, slots, light_bits, lights, scratch.light_columns);
+    if (!same) fill_columns<shape, aniso>(lobe, tile, slots, view_bits, views, scratch.view_columns);
+    const float* light_columns = scratch.light_columns.data();
+    const float* view_columns = same ? light_columns : scratch.view_columns.data();
+    auto column = [&](const float* of, Column which, size_t k)
+                      HWY_ATTR { return hn::LoadU(d, of + which * direct_chunk + k); };
+    auto factors_at = [&](const float* of, size_t k) HWY_ATTR {
         Factors f;
-        f.z = z;
-        f.s = hn::LoadU(d, of + direct_chunk + k);
+        f.z = column(of, cosine, k);
+        f.s = column(of, shape_s, k);
         f.x = f.y = hn::Zero(d);
-        if constexpr (aniso) {
-            f.x = hn::LoadU(d, of + 2 * direct_chunk + k);
-            f.y = hn::LoadU(d, of + 3 * direct_chunk + k);
-        }
+        if constexpr (aniso) f.x = column(of, shape_x, k), f.y = column(of, shape_y, k);
         return f;
     };
     for (int l = 0; l < lights.n; ++l)
         for (int first = same ? l : 0; first < views.n; first += abreast) {
-            const float *fl = light_factors + l * size, *fv[abreast];
-            const uint32_t *bl = light_bits + l * direct_chunk, *bv[abreast];
-            VF cos_ab[abreast], inverse[abreast], reflected[abreast], sum[abreast];
+            const float *of_light = light_columns + l * size, *of_view[abreast];
+            const uint32_t *lit = light_bits + l * direct_chunk, *visible[abreast];
+            VF cos_ab[abreast], inverse2[abreast], glossy[abreast], diffuse[abreast];
             for (int q = 0; q < abreast; ++q) {
                 const int v = std::min(first + q, views.n - 1);  // beyond the last: computed in vain
                 const size_t pair = static_cast<size_t>(l) * views.n + v;
                 cos_ab[q] = hn::Set(d, scratch.cos_ab[pair]);
-                inverse[q] = hn::Set(d, scratch.inverse[pair]);
-                reflected[q] = hn::Set(d, 1.0f);
-                if (lobe && lobe->same_index)
-                    reflected[q] = fresnel_factor(cos_2_to_half(cos_ab[q]), hn::Set(d, lobe->same_index->eta),
-                                                  hn::Set(d, lobe->same_index->k));
-                fv[q] = view_factors + v * size;
-                bv[q] = view_bits + v * direct_chunk;
-                sum[q] = hn::Zero(d);
+                inverse2[q] = hn::Set(d, scratch.inverse2[pair]);
+                of_view[q] = view_columns + v * size;
+                visible[q] = view_bits + v * direct_chunk;
+                glossy[q] = diffuse[q] = hn::Zero(d);
             }
             for (size_t k = 0; k < slots.count; k += lanes) {
                 const size_t at = slots.first + k;
-                const auto lit = hn::LoadU(du, bl + k);
-                const VF za = hn::LoadU(d, fl + k), area = hn::Mul(za, hn::LoadU(d, slots.area + at)),
-                         diffuse = lambert ? hn::LoadU(d, lambert + at) : hn::Zero(d);
+                const VF za = column(of_light, cosine, k), area = hn::LoadU(d, slots.area + at);
+                const VF flat =
+                    lambert ? hn::Mul(hn::Mul(area, za), hn::LoadU(d, lambert + at)) : hn::Zero(d);
+                VF strength = hn::Zero(d);
                 LobeNumbers numbers;
                 Factors a;
                 if (lobe) {
                     numbers = load_numbers<shape, aniso, fresnel>(
                         *lobe, [&](const std::vector<float>& values) { return hn::LoadU(d, &values[at]); });
-                    a = factors_at(fl, k, za);
+                    a = factors_at(of_light, k);
+                    strength = hn::Mul(area, numbers.weight);
+                    if constexpr (!is_microfacet(shape))
+                        strength = hn::Mul(strength, za);
+                    else if constexpr (single)
+                        strength = hn::And(strength, column(of_light, seen, k));
                 }
                 for (int q = 0; q < abreast; ++q) {
-                    const VF count = bit_count(hn::And(lit, hn::LoadU(du, bv[q] + k)), single_bit),
-                             zb = hn::LoadU(d, fv[q] + k);
-                    VF f = diffuse;
-                    if (lobe)
-                        f = hn::MulAdd(lobe_value<shape, aniso, fresnel>(numbers, a, factors_at(fv[q], k, zb),
-                                                                         cos_ab[q], inverse[q]),
-                                       reflected[q], f);
-                    sum[q] = hn::MulAdd(hn::Mul(hn::Mul(area, zb), count), f, sum[q]);
+                    VF zb = column(of_view[q], cosine, k), visible_strength = strength;
+                    if constexpr (!single) {
+                        const auto both = hn::And(hn::LoadU(du, lit + k), hn::LoadU(du, visible[q] + k));
+                        const VF count = hn::ConvertTo(d, hn::BitCast(di, hn::PopulationCount(both)));
+                        zb = hn::Mul(zb, count);
+                        visible_strength = hn::Mul(strength, count);
+                    }
+                    diffuse[q] = hn::MulAdd(flat, zb, diffuse[q]);
+                    if (!lobe) continue;
+                    const Factors b = factors_at(of_view[q], k);
+                    if constexpr (is_microfacet(shape)) {
+                        if constexpr (single)
+                            visible_strength = hn::And(strength, column(of_view[q], seen, k));
+                        const VF value = microfacet_value<shape, aniso, fresnel>(
+                            numbers, hn::Add(a.z, b.z), hn::Add(a.x, b.x), hn::Add(a.y, b.y),
+                            hn::Add(a.s, b.s), cos_ab[q], inverse2[q]);
+                        glossy[q] = hn::MulAdd(visible_strength, value, glossy[q]);
+                    } else {
+                        const VF value =
+                            lobe_value<shape, aniso, fresnel>(numbers, a, b, cos_ab[q], inverse2[q]);
+                        glossy[q] = hn::MulAdd(hn::Mul(strength, zb), value, glossy[q]);
+                    }
                 }
             }
-            for (int q = 0; q < std::min(abreast, views.n - first); ++q)
-                sums[static_cast<size_t>(l) * views.n + first + q] += hn::GetLane(hn::SumOfLanes(d, sum[q]));
+            for (int q = 0; q < std::min(abreast, views.n - first); ++q) {
+                if (lobe && lobe->same_index)
+                    glossy[q] = hn::Mul(
+                        glossy[q], fresnel_factor(cos_2_to_half(cos_ab[q]), hn::Set(d, lobe->same_index->eta),
+                                                  hn::Set(d, lobe->same_index->k)));
+                sums[static_cast<size_t>(l) * views.n + first + q] +=
+                    hn::GetLane(hn::SumOfLanes(d, hn::Add(glossy[q], diffuse[q])));
+            }
         }
 }
 
@@ -146,13 +172,18 @@ void direct(const SlotMaterial& material, const Tile& tile, const DirectSlots& s
     gather_bits(slots.light_bits, slots.light_stride, lights.n, slots.count, scratch.light_bits);
     if (!same) gather_bits(slots.view_bits, slots.view_stride, views.n, slots.count, scratch.view_bits);
     const float* lambert = material.lambert.data();
-    if (material.lobes.empty())
-        direct_of_lobe<Shape::blinn_phong, false, false>(nullptr, lambert, tile, slots, lights, views, same,
+    auto add = [&]<Shape shape, bool aniso, bool fresnel>(const SlotLobe* lobe) {
+        if (slots.n_sub_samples == 1)
+            direct_of_lobe<shape, aniso, fresnel, true>(lobe, lambert, tile, slots, lights, views, same,
+                                                        scratch, sums);
+        else
+            direct_of_lobe<shape, aniso, fresnel, false>(lobe, lambert, tile, slots, lights, views, same,
                                                          scratch, sums);
+    };
+    if (material.lobes.empty()) add.template operator()<Shape::blinn_phong, false, false>(nullptr);
     for (const SlotLobe& lobe : material.lobes) {
         with_lobe(lobe, lobe.fresnel && !lobe.same_index, [&]<Shape shape, bool aniso, bool fresnel>() {
-            direct_of_lobe<shape, aniso, fresnel>(&lobe, lambert, tile, slots, lights, views, same, scratch,
-                                                  sums);
+            add.template operator()<shape, aniso, fresnel>(&lobe);
         });
         lambert = nullptr;
     }
@@ -174,7 +205,7 @@ DirectScratch::DirectScratch(const DirectionArrays& lights, const DirectionArray
                          z = static_cast<double>(lights.z[l]) + views.z[v],
                          length2 = std::max(x * x + y * y + z * z, 1e-12);
             cos_ab.push_back(static_cast<float>(length2 / 2 - 1));
-            inverse.push_back(static_cast<float>(1 / std::sqrt(length2)));
+            inverse2.push_back(static_cast<float>(1 / length2));
         }
 }
 

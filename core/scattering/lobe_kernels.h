@@ -43,10 +43,10 @@ struct DirectSlots {
     size_t light_stride = 0, view_stride = 0;
 };
 
-// What one thread works with: room, and of each pair of light and view its cosine and 1 / |l + v|.
+// What one thread works with: room, and of each pair of light and view its cosine and 1 / |l + v|^2.
 struct DirectScratch {
     std::vector<uint32_t> light_bits, view_bits;
-    std::vector<float> light_factors, view_factors, cos_ab, inverse;
+    std::vector<float> light_columns, view_columns, cos_ab, inverse2;
     DirectScratch(const DirectionArrays& lights, const DirectionArrays& views);
 };
 

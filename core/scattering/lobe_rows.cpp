@@ -37,8 +37,8 @@ void rows_of_lobe(const SlotLobe& lobe, const Tile& tile, size_t n_rows, const u
                      length2 = hn::Max(dot(sx, sy, sz, sx, sy, sz), hn::Set(d, 1e-12f));
             const VF cos_ab = hn::MulSub(length2, hn::Set(d, 0.5f), hn::Set(d, 1.0f));
             const VF value =
-                lobe_value<shape, aniso, fresnel>(numbers, own, other, cos_ab, reciprocal_sqrt(length2));
-            hn::StoreU(hn::Add(hn::LoadU(d, out + c), value), d, out + c);
+                lobe_value<shape, aniso, fresnel>(numbers, own, other, cos_ab, reciprocal(length2));
+            hn::StoreU(hn::MulAdd(numbers.weight, value, hn::LoadU(d, out + c)), d, out + c);
         }
     }
 }

@@ -27,6 +27,10 @@ using Shape = SlotLobe::Shape;
 
 constexpr float least_cosine = 1e-9f;
 
+constexpr bool is_microfacet(Shape shape) {
+    return shape == Shape::ggx || shape == Shape::beckmann;
+}
+
 HWY_INLINE VF reciprocal(VF x) {
     const VF r = hn::ApproximateReciprocal(x);
     return hn::Mul(r, hn::NegMulAdd(x, r, hn::Set(D(), 2.0f)));
@@ -122,7 +126,7 @@ template <Shape shape, bool aniso, bool fresnel, class Load>
 HWY_INLINE LobeNumbers load_numbers(const SlotLobe& lobe, Load&& load) {
     LobeNumbers n;
     n.weight = load(lobe.weight);
-    if constexpr (shape == Shape::ggx || shape == Shape::beckmann) {
+    if constexpr (is_microfacet(shape)) {
         if constexpr (aniso) {
             n.tx = load(lobe.tangent_x), n.ty = load(lobe.tangent_y), n.tz = load(lobe.tangent_z);
             n.bx = load(lobe.bitangent_x), n.by = load(lobe.bitangent_y), n.bz = load(lobe.bitangent_z);
@@ -146,7 +150,7 @@ HWY_INLINE Factors factors_of(const LobeNumbers& n, VF z, VF dx, VF dy, VF dz) {
     Factors f;
     f.z = hn::Max(z, hn::Set(d, least_cosine));
     f.s = f.x = f.y = hn::Zero(d);
-    if constexpr (shape == Shape::ggx || shape == Shape::beckmann) {
+    if constexpr (is_microfacet(shape)) {
         VF rough2;  // alpha^2 sin^2
         if constexpr (aniso) {
             f.x = dot(n.tx, n.ty, n.tz, dx, dy, dz);
@@ -198,47 +202,56 @@ HWY_INLINE VF fresnel_factor(VF cos_2, VF eta, VF k) {
     return hn::Mul(hn::Mul(half, s), hn::Add(one, p));
 }
 
-// cos_ab between the two directions, inverse: 1 / |a + b|.
+// A microfacet lobe over its weight, from the sums of both directions' factors. smith: za sb + zb sa; or
+// sa / za + sb / zb, which gives the lobe times za zb for less. inverse2: 1 / |a + b|^2.
 template <Shape shape, bool aniso, bool fresnel>
-HWY_INLINE VF lobe_value(const LobeNumbers& n, const Factors& a, const Factors& b, VF cos_ab, VF inverse) {
+HWY_INLINE VF microfacet_value(const LobeNumbers& n, VF sum_z, VF sum_x, VF sum_y, VF smith, VF cos_ab,
+                               VF inverse2) {
     const D d;
-    const VF one = hn::Set(d, 1.0f), zero = hn::Zero(d);
-    if constexpr (shape == Shape::coat_base) {
-        return hn::Mul(n.weight, hn::Mul(a.s, b.s));
-    } else if constexpr (shape == Shape::phong) {
-        const VF mirrored = hn::MulSub(hn::Add(a.z, a.z), b.z, cos_ab);
-        const VF power =
-            hn::Exp(d, hn::Mul(n.sharpness, hn::Log(d, hn::Clamp(mirrored, hn::Set(d, 1e-30f), one))));
-        const auto there = hn::Or(hn::Gt(mirrored, zero), hn::Le(n.sharpness, zero));
-        return hn::IfThenElseZero(there, hn::Mul(n.weight, power));
+    const VF one = hn::Set(d, 1.0f), nh2 = hn::Min(hn::Mul(square(sum_z), inverse2), one);
+    // tan^2 / alpha^2, times nh2. 1 - cos^2 first: of a narrow lobe's sharpness, 1e12, nothing is left of a 1
+    // added to it.
+    const auto slope2_and = [&](VF more) HWY_ATTR {
+        if constexpr (aniso)
+            return hn::MulAdd(hn::MulAdd(sum_x, sum_x, square(sum_y)), inverse2, more);
+        else
+            return hn::MulAdd(hn::Sub(one, nh2), n.sharpness, more);
+    };
+    const VF least = hn::Set(d, 1e-30f);  // what pads a tile has no normal
+    VF value;
+    if constexpr (shape == Shape::ggx) {
+        const VF below = hn::Mul(square(slope2_and(nh2)), smith);  // isotropic: at least the cosines' square
+        value = reciprocal(aniso ? hn::Max(below, least) : below);
     } else {
-        const VF nh = hn::Min(hn::Mul(hn::Add(a.z, b.z), inverse), one), nh2 = square(nh);
-        if constexpr (shape == Shape::blinn_phong) {
-            const VF log = hn::Log(d, hn::Max(nh, hn::Set(d, 1e-30f)));
-            return hn::Mul(n.weight, hn::Exp(d, hn::Mul(n.sharpness, log)));
+        const VF safe2 = hn::Max(nh2, hn::Set(d, 1e-12f));
+        const VF falls =
+            hn::Exp(d, hn::Neg(hn::Min(hn::Div(slope2_and(hn::Zero(d)), safe2), hn::Set(d, 80.0f))));
+        value = hn::Mul(falls, reciprocal(hn::Max(hn::Mul(square(safe2), smith), least)));
+    }
+    if constexpr (fresnel) value = hn::Mul(value, fresnel_factor(cos_2_to_half(cos_ab), n.eta, n.k));
+    return value;
+}
+
+// Any lobe over its weight. cos_ab between the two directions, inverse2: 1 / |a + b|^2.
+template <Shape shape, bool aniso, bool fresnel>
+HWY_INLINE VF lobe_value(const LobeNumbers& n, const Factors& a, const Factors& b, VF cos_ab, VF inverse2) {
+    const D d;
+    if constexpr (is_microfacet(shape)) {
+        return microfacet_value<shape, aniso, fresnel>(
+            n, hn::Add(a.z, b.z), hn::Add(a.x, b.x), hn::Add(a.y, b.y),
+            hn::MulAdd(a.z, b.s, hn::Mul(b.z, a.s)), cos_ab, inverse2);
+    } else if constexpr (shape == Shape::coat_base) {
+        return hn::Mul(a.s, b.s);
+    } else {
+        const VF one = hn::Set(d, 1.0f), least = hn::Set(d, 1e-30f);
+        if constexpr (shape == Shape::phong) {
+            const VF mirrored = hn::MulSub(hn::Add(a.z, a.z), b.z, cos_ab);
+            const VF power = hn::Exp(d, hn::Mul(n.sharpness, hn::Log(d, hn::Clamp(mirrored, least, one))));
+            const auto there = hn::Or(hn::Gt(mirrored, hn::Zero(d)), hn::Le(n.sharpness, hn::Zero(d)));
+            return hn::IfThenElseZero(there, power);
         } else {
-            // tan^2 / alpha^2, times nh^2.
-            VF slope2 = zero;
-            if constexpr (aniso)
-                slope2 = hn::Mul(hn::MulAdd(hn::Add(a.x, b.x), hn::Add(a.x, b.x), square(hn::Add(a.y, b.y))),
-                                 square(inverse));
-            else if constexpr (shape == Shape::beckmann)
-                slope2 = hn::Mul(hn::Sub(one, nh2), n.sharpness);
-            const VF smith = hn::MulAdd(a.z, b.s, hn::Mul(b.z, a.s));
-            const VF least = hn::Set(d, 1e-30f);  // what pads a tile has no normal
-            VF value;
-            if constexpr (shape == Shape::ggx) {
-                // 1 - cos^2 first: of a narrow lobe's sharpness, 1e12, nothing is left of a 1 added to it.
-                const VF q = hn::Add(aniso ? slope2 : hn::Mul(hn::Sub(one, nh2), n.sharpness), nh2);
-                value = hn::Mul(n.weight, reciprocal(hn::Max(hn::Mul(square(q), smith), least)));
-            } else {
-                const VF safe2 = hn::Max(nh2, hn::Set(d, 1e-12f));
-                const VF falls = hn::Exp(d, hn::Neg(hn::Min(hn::Div(slope2, safe2), hn::Set(d, 80.0f))));
-                value = hn::Mul(hn::Mul(n.weight, falls),
-                                reciprocal(hn::Max(hn::Mul(square(safe2), smith), least)));
-            }
-            if constexpr (fresnel) value = hn::Mul(value, fresnel_factor(cos_2_to_half(cos_ab), n.eta, n.k));
-            return value;
+            const VF nh2 = hn::Clamp(hn::Mul(square(hn::Add(a.z, b.z)), inverse2), least, one);
+            return hn::Exp(d, hn::Mul(hn::Mul(n.sharpness, hn::Set(d, 0.5f)), hn::Log(d, nh2)));
         }
     }
 }

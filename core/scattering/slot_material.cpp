@@ -31,8 +31,8 @@ struct Builder {
 
     using CellValue = std::function<double(int i, int j)>;
 
-    std::vector<float> on_slots(const CellValue& value) const {
-        std::vector<float> values(tile.n_slots(), 0.0f);
+    std::vector<float> on_slots(const CellValue& value, float padding = 0) const {
+        std::vector<float> values(tile.n_slots(), padding);
         for_each_facet(
             tile, [&](size_t slot, int, int i, int j) { values[slot] = static_cast<float>(value(i, j)); });
         return values;
@@ -74,7 +74,7 @@ struct Builder {
         }
         if (!lobe.anisotropic) {
             lobe.alpha2 = on_slots([&](int i, int j) { return std::pow(alpha_x(i, j), 2); });
-            lobe.sharpness = on_slots([&](int i, int j) { return std::pow(alpha_x(i, j), -2); });
+            lobe.sharpness = on_slots([&](int i, int j) { return std::pow(alpha_x(i, j), -2); }, 1);
         } else {
             lobe.alpha_x4 = on_slots([&](int i, int j) { return std::pow(alpha_x(i, j), 4); });
             lobe.alpha_y4 = on_slots([&](int i, int j) { return std::pow(alpha_y(i, j), 4); });
