@@ -39,12 +39,17 @@ class KeptBlocks {
         }
     }
 
+    size_t bytes() const {
+        const std::lock_guard lock(mutex_);
+        return kept_;
+    }
+
   private:
     struct Block {
         void* memory;
         size_t size;
     };
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::vector<Block> blocks_;  // oldest first
     size_t kept_ = 0;
 };
@@ -73,6 +78,10 @@ void give_back_huge_pages(void* memory, size_t bytes) noexcept {
         kept_blocks().keep(memory);
     else
         std::free(memory);
+}
+
+size_t kept_memory() {
+    return kept_blocks().bytes();
 }
 
 }  // namespace gonio

@@ -15,6 +15,7 @@ inline constexpr size_t huge_page = size_t{2} << 20, most_kept_memory = size_t{2
 // Throws std::bad_alloc. bytes: what was asked for.
 void* take_huge_pages(size_t bytes);
 void give_back_huge_pages(void* memory, size_t bytes) noexcept;
+size_t kept_memory();  // bytes that wait
 
 // Elements of a vector with this allocator start uninitialised: such arrays are always written whole before
 // they are read.

@@ -151,17 +151,20 @@ HWY_INLINE Factors factors_of(const LobeNumbers& n, VF z, VF dx, VF dy, VF dz) {
     f.z = hn::Max(z, hn::Set(d, least_cosine));
     f.s = f.x = f.y = hn::Zero(d);
     if constexpr (is_microfacet(shape)) {
-        VF rough2;  // alpha^2 sin^2
+        // alpha^2 sin^2, and z^2 + that
+        VF rough2, s2;
         if constexpr (aniso) {
             f.x = dot(n.tx, n.ty, n.tz, dx, dy, dz);
             f.y = dot(n.bx, n.by, n.bz, dx, dy, dz);
             rough2 = hn::MulAdd(n.alpha_x4, square(f.x), hn::Mul(n.alpha_y4, square(f.y)));
+            s2 = hn::MulAdd(f.z, f.z, rough2);
         } else {
-            rough2 = hn::Mul(n.alpha2, hn::Max(hn::Zero(d), hn::NegMulAdd(f.z, f.z, hn::Set(d, 1.0f))));
+            const VF z2 = square(f.z), one = hn::Set(d, 1.0f);
+            rough2 = hn::Mul(n.alpha2, hn::Max(hn::Zero(d), hn::Sub(one, z2)));
+            s2 = hn::MulAdd(hn::Sub(one, n.alpha2), z2, n.alpha2);
         }
         if constexpr (shape == Shape::ggx) {
-            const VF s2 = hn::MulAdd(f.z, f.z, rough2);
-            f.s = hn::Mul(s2, reciprocal_sqrt(hn::Max(s2, hn::Set(d, 1e-30f))));
+            f.s = hn::Mul(s2, reciprocal_sqrt(s2));  // z is at least least_cosine
         } else {
             // Lambda = (exp(-a^2) / (a sqrt(pi)) - erfc(a)) / 2, a = cot / alpha
             const VF a =
