@@ -29,12 +29,29 @@ double noise_correction_percent(const RunContext& context, const Stage& stage) {
     return stage.noise ? -100 * stage.noise->kappa * std::pow(largest, 2) : 0.0;
 }
 
-int unresolved_directions(const MeasuredScene& context, const Stage& stage) {
-    if (stage.settings.tiles_x > 0 || !context.projected_area_is_known()) return 0;
+// Directions whose lit slivers no sample met, and which of them is worst, in words.
+struct Unresolved {
     int n = 0;
-    for (const Moments* projected : {&stage.projected_lights, &stage.projected_views})
-        for (const double ratio : projected->mean()) n += unresolved_share(ratio) > 0;
-    return n;
+    double share = 0;
+    std::string worst;
+};
+Unresolved unresolved_directions(const MeasuredScene& scene, const Stage& stage) {
+    Unresolved found;
+    if (stage.settings.tiles_x > 0 || !scene.projected_area_is_known()) return found;
+    const auto look = [&](const char* side, const std::vector<AnglesDeg>& directions,
+                          const std::vector<double>& ratios) {
+        for (size_t d = 0; d < ratios.size(); ++d) {
+            const double share = unresolved_share(ratios[d]);
+            found.n += share > 0;
+            if (share <= found.share) continue;
+            found.share = share;
+            found.worst = std::string(side) + " theta " + number(directions[d].theta_deg) + ", phi " +
+                          number(directions[d].phi_deg) + " degrees";
+        }
+    };
+    look("incident", scene.plan->incident, stage.projected_lights.mean());
+    look("outgoing", scene.plan->outgoing, stage.projected_views.mean());
+    return found;
 }
 
 }  // namespace
@@ -66,11 +83,12 @@ void describe_skips(const MeasuredScene& scene, const Stage& last, const RunValu
         report.skipped.push_back({"shadow tests of steep directions", "they are steeper than every facet"});
     if (last.settings.tiles_x > 0)
         report.skipped.push_back({"most receivers", "windows of the surface reach the error asked for"});
-    if (const int n = unresolved_directions(scene, last); n > 0) {
-        report.counters.push_back({"directions whose lit slivers were not resolved", static_cast<double>(n)});
-        report.warnings.push_back(std::to_string(n) +
-                                  " directions graze the relief so that samples miss what they light: their "
-                                  "bias column says so; more sub_samples help");
+    if (const Unresolved found = unresolved_directions(scene, last); found.n > 0) {
+        report.counters.push_back({"directions whose lit slivers were not resolved", double(found.n)});
+        report.warnings.push_back(
+            (found.n == 1 ? "1 direction grazes" : std::to_string(found.n) + " directions graze") +
+            " the relief so that samples miss what is lit or seen (worst: " + found.worst + ", " +
+            number(100 * found.share) + " % of it): the bias column says so; more sub_samples help");
     }
 }
 

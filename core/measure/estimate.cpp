@@ -4,12 +4,10 @@
 #include <cmath>
 #include <numeric>
 
+#include "measure/stage_average.h"
+
 namespace gonio {
 namespace {
-
-std::vector<double> part(const std::vector<double>& values, size_t first, size_t n) {
-    return {values.begin() + static_cast<long>(first), values.begin() + static_cast<long>(first + n)};
-}
 
 // The first order of a row. A constant albedo scales it, a map's channels share
 // its proportion.
@@ -76,22 +74,21 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
     const size_t slices = size / (rows * n_channels);
     Estimate e;
     e.f.assign(size, 0.0);
-    e.se = e.bias = e.f;
+    e.se = e.bias = e.hidden = e.f;
 
     std::vector<const Stage*> used;
     for (const Stage& s : stages)
         if (s.settings.refinement == stages.back().settings.refinement && s.f.mean().size() == size)
             used.push_back(&s);
-    std::vector<std::vector<std::vector<double>>> se(used.size());  // [stage][channel, slice][row]
+    std::vector<std::vector<std::vector<double>>> se(used.size()),
+        hidden(used.size());  // [stage][channel, slice][row]
     std::vector<double> weight(used.size());
     for (size_t s = 0; s < used.size(); ++s) {
         double pooled = 0;
         for (size_t slice = 0; slice < n_channels * slices; ++slice) {
             se[s].push_back(standard_errors(used[s]->f, slice * rows, groups));
-            if (slice % slices != 0) continue;
-            const std::vector<double> scale = error_scale(part(used[s]->f.mean(), slice * rows, rows));
-            for (size_t r = 0; r < rows; ++r)
-                if (scale[r] > 0) pooled += std::pow(se[s].back()[r] / scale[r], 2);
+            hidden[s].push_back(hidden_light(context, *used[s], slice));
+            if (slice % slices == 0) pooled += pooled_doubt(*used[s], slice, se[s].back(), hidden[s].back());
         }
         weight[s] = 1 / std::max(pooled, 1e-30);
     }
@@ -100,12 +97,6 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
     for (size_t s = 0; s < used.size(); ++s) {
         const Stage& stage = *used[s];
         const double share = weight[s] / weights;
-        std::vector<double> unresolved(rows, 0.0);
-        if (stage.settings.tiles_x == 0 && context.projected_area_is_known())
-            for (size_t r = 0; r < rows; ++r)
-                unresolved[r] =
-                    std::min(1.0, unresolved_share(stage.projected_lights.mean()[groups.light[r]]) +
-                                      unresolved_share(stage.projected_views.mean()[groups.view[r]]));
         for (size_t c = 0; c < n_channels; ++c) {
             for (size_t slice = 0; slice < slices; ++slice) {
                 const MeshShare mesh =
@@ -127,16 +118,13 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                                                                   : context.view_to_light[groups.view[r]];
                     const double cos_light = context.lights[groups.light[r]].z,
                                  cos_view = context.views[groups.view[r]].z;
-                    // What could not be sampled: f is at most albedo / (pi cos) on either side, as no facet
-                    // gets more light than the beam carries.
-                    const double lost = unresolved[r],
-                                 ceiling = lost < 1 ? f : 1 / (pi * std::max(cos_light, cos_view));
+                    const double unseen = hidden[s][c * slices + slice][r];
                     const double mesh_doubt =
                         mesh.uncertainty_of(light, view, std::min(cos_light, cos_view)) * indirect;
                     e.f[i] += share * (f - noisy.amount + mesh.correction_of(light, view) * indirect);
                     e.se[i] += std::pow(share * se[s][c * slices + slice][r], 2);
-                    e.bias[i] +=
-                        share * (std::hypot(mesh_doubt, noisy.doubt, left_out) + skipped + lost * ceiling);
+                    e.bias[i] += share * (std::hypot(mesh_doubt, noisy.doubt, left_out) + skipped + unseen);
+                    e.hidden[i] += share * unseen;
                 }
             }
         }
@@ -152,30 +140,13 @@ Estimate make_estimate(const RunContext& context, const RowGroups& groups, const
                 for (size_t slice = 1; slice < slices; ++slice) sum += e.f[(c * slices + slice) * rows + r];
             }
 
-    double random = 0, systematic = 0, direct = 0;
     const Parameter& albedo = context.lambertian->albedo;
     const std::vector<double>& values = albedo.constant;
     const size_t brightest =
         albedo.is_map()
             ? 0
             : static_cast<size_t>(std::max_element(values.begin(), values.end()) - values.begin());
-    const double unit_direct = albedo.is_map() ? 1.0 : values[brightest];
-    const std::vector<double> direct_se = standard_errors(stages.back().direct, 0, groups);
-    for (size_t c = 0; c < n_channels; ++c) {
-        const size_t first = c * slices * rows;
-        const std::vector<double> scale = error_scale(part(e.f, first, rows));
-        for (size_t r = 0; r < rows; ++r) {
-            if (!(scale[r] > 0)) continue;
-            random += std::pow(e.se[first + r] / scale[r], 2);
-            systematic += std::pow(e.bias[first + r] / scale[r], 2);
-            if (c == brightest) direct += std::pow(unit_direct * direct_se[r] / scale[r], 2);
-        }
-    }
-    const double n = static_cast<double>(rows * n_channels);
-    e.random = std::sqrt(random / n);
-    e.systematic = std::sqrt(systematic / n);
-    e.total = std::hypot(e.random, e.systematic);
-    e.direct = std::sqrt(direct / static_cast<double>(rows));
+    summarise(context, stages.back(), brightest, albedo.is_map() ? 1.0 : values[brightest], e);
     return e;
 }
 

@@ -24,10 +24,12 @@ struct Stage {
 
 struct Estimate {
     std::vector<double> f, se, bias;  // [channel][slice][row], as in Table
+    std::vector<double> hidden;       // the part of bias that slivers no sample met may hide
     // Relative to max(f, 0.01 mean f), rms over rows and channels: standard error and bias together, each
     // alone, and the standard error of the direct part of channel 0.
     double total = 0, random = 0, systematic = 0, direct = 0;
     double rare = 0;  // part of `systematic`: what too few samples meet; more of them take it away
+    double unresolved = 0;  // what systematic would fall by if nothing were hidden
 };
 
 // Stages on the mesh of the last one are independent estimates of the same values: they are averaged,

@@ -123,12 +123,13 @@ void GraphTransport::find_bias(const std::vector<Stage>& stages, const SideWork&
     mesh_doubt_ = predict_mesh_bias(*context_.surface).guess;
     const Estimate guessed = estimate(stages);
     const Accuracy& accuracy = context_.plan->accuracy;
+    const double guess =
+        safe_sqrt(guessed.systematic * guessed.systematic - guessed.rare * guessed.rare) - guessed.unresolved;
     if (context_.allow_skips &&
-        2 * safe_sqrt(guessed.systematic * guessed.systematic - guessed.rare * guessed.rare) <
-            std::max(accuracy.target(), accuracy.samples ? guessed.random : 0.0)) {
+        2 * guess < std::max(accuracy.target(), accuracy.samples ? guessed.random : 0.0)) {
         if (stages.size() == 1)
-            report.skipped.push_back({"two-grid run", "facets resolve the relief: mesh bias guessed at " +
-                                                          number(guessed.systematic)});
+            report.skipped.push_back(
+                {"two-grid run", "facets resolve the relief: mesh bias guessed at " + number(guess)});
         return;
     }
     const std::string bytes = side.kept(stages.back(), "mesh", [&] {
@@ -206,8 +207,7 @@ Estimate GraphTransport::estimate(const std::vector<Stage>& stages) const {
     const Stage& last = stages.back();
     const size_t rows = context_.rows(), n_channels = context_.n_channels(),
                  slices = e.f.size() / (rows * n_channels);
-    const std::vector<double> unresolved = unresolved_rows(context_, last);
-    summarise(context_, last, e);
+    summarise(context_, last, 0, 1, e);
     const double shared_share = e.random > 0 ? shared_directions_bias(context_, last, e) / e.random : 0.0;
     const int max_order = context_.plan->max_order;
     std::vector<double> indirects(e.f.size());
@@ -224,17 +224,12 @@ Estimate GraphTransport::estimate(const std::vector<Stage>& stages) const {
                 const double indirect = slice == 1 ? 0.0 : slice == 0 ? std::max(0.0, f - direct) : f;
                 indirects[i] = indirect;
                 const double left_out = slice == 0 ? last.remainder * (direct + 2 * indirect) : 0.0;
-                // What could not be sampled: no facet gets more light than the beam carries.
-                const double lost = unresolved[r],
-                             cosine = std::max(context_.lights[context_.groups.light[r]].z,
-                                               context_.views[context_.groups.view[r]].z),
-                             ceiling = lost < 1 ? f : 1 / (pi * cosine);
                 const bool reuses = context_.transports() && max_order != 2 && slice != 1 && slice != 2;
                 const double shared = reuses ? shared_share * e.se[i] : 0.0;
-                e.bias[i] = std::hypot(mesh_doubt_ * indirect, left_out, shared) + lost * ceiling;
+                e.bias[i] = std::hypot(mesh_doubt_ * indirect, left_out, shared) + e.hidden[i];
             }
     add_rare(last, indirects, e);
-    summarise(context_, last, e);
+    summarise(context_, last, 0, 1, e);
     return e;
 }
 
@@ -250,7 +245,8 @@ NextStep GraphTransport::next_step(const Stage& stage, const Estimate& e, double
         if (1 + most_growth * met < std::pow(e.rare / target, 2) * (1 + met))
             return {false, 0, stage.settings};
     }
-    if (mesh > 0.8 * target) {
+    if (const auto slivers = more_sub_samples(context_, stage, e, target)) return *slivers;
+    if (mesh - e.unresolved > 0.8 * target) {
         RunSettings finer = next;
         finer.refinement *= 2;
         finer.directions *= 4;
@@ -258,8 +254,9 @@ NextStep GraphTransport::next_step(const Stage& stage, const Estimate& e, double
             next = finer;
             return step;
         }
-        if (random < 0.5 * target) return {false, 0, stage.settings};  // it cannot be refined away
     }
+    if (mesh > 0.8 * target && random < 0.5 * target)
+        return {false, 0, stage.settings};  // it cannot be refined away
     const double left = std::sqrt(std::max(target * target - mesh * mesh, 0.04 * target * target));
     const double left_random = std::sqrt(std::max(left * left - shared * shared, 0.04 * left * left)),
                  excess = random / left_random;
@@ -274,13 +271,10 @@ NextStep GraphTransport::next_step(const Stage& stage, const Estimate& e, double
     }
     // Measured (shared/performance_glossy A1, A2): the direct error falls as n^-0.6, that of the orders
     // beyond as n^-1.2.
-    auto grown = [](int n, double excess_of_part, double order, int most) {
-        return std::min(
-            most, static_cast<int>(std::ceil(n * std::clamp(std::pow(excess_of_part, 1 / order), 1.5, 8.0))));
-    };
     const double indirect = std::hypot(safe_sqrt(random * random - e.direct * e.direct), shared),
                  share = 0.65 * left;
-    if (e.direct > share) next.sub_samples = grown(next.sub_samples, e.direct / share, 0.6, 4096);
+    if (e.direct > share)
+        next.sub_samples = grown(next.sub_samples, e.direct / share, 0.6, most_direct_samples);
     if (indirect > share && context_.transports()) {
         RunSettings more = next;
         // Rays along lobes gain by more of them what they would by more runs.

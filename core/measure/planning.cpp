@@ -77,6 +77,24 @@ RunSettings first_settings(const RunContext& context, double target) {
     return settings;
 }
 
+int grown(int n, double excess, double order, int most) {
+    return std::min(most, static_cast<int>(std::ceil(n * std::clamp(std::pow(excess, 1 / order), 1.5, 8.0))));
+}
+
+std::optional<NextStep> more_sub_samples(const MeasuredScene& scene, const Stage& stage, const Estimate& e,
+                                         double target) {
+    constexpr double most_points = 1 << 22;  // a run and facet class: seconds for a hundred directions
+    if (e.unresolved <= 0.5 * target) return std::nullopt;
+    NextStep step{true, 0, stage.settings};
+    int& n = step.settings.sub_samples;
+    const double parts = worked_cells(scene, stage.settings) * std::pow(stage.settings.refinement, 2);
+    const int most = static_cast<int>(std::min<double>(most_direct_samples, most_points / parts));
+    if (n >= most) return std::nullopt;
+    // The sequence is even: shares of a facet are known to about 1 / n.
+    n = grown(n, e.unresolved / (0.5 * target), 1, most);
+    return step;
+}
+
 std::optional<NextStep> more_windows(const MeasuredScene& scene, const Stage& stage, double excess,
                                      const std::function<bool(const RunSettings&)>& fits) {
     if (stage.settings.tiles_x == 0) return std::nullopt;
@@ -107,7 +125,8 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
         step.possible = true;
         return step;
     };
-    if (e.systematic > 0.8 * target) {
+    if (const auto slivers = more_sub_samples(context, stage, e, target)) return *slivers;
+    if (e.systematic - e.unresolved > 0.8 * target) {
         RunSettings finer = next;
         finer.refinement *= 2;
         finer.directions *= 4;  // each part keeps its number of directions: fewer would sample K too noisily
@@ -115,8 +134,9 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
             next = finer;
             return decided();
         }
-        if (e.random < 0.5 * target) return step;  // what is left cannot be refined away
     }
+    if (e.systematic > 0.8 * target && e.random < 0.5 * target)
+        return step;  // what is left cannot be refined away
     const double left =
         std::sqrt(std::max(target * target - e.systematic * e.systematic, 0.04 * target * target));
     const double excess = e.random / left;
@@ -129,13 +149,10 @@ NextStep next_step(const RunContext& context, const Stage& stage, const Estimate
                        most_runs - stage.f.count());
         return decided();
     }
-    auto grown = [](int n, double excess_of_part, double order, int most) {
-        return std::min(
-            most, static_cast<int>(std::ceil(n * std::clamp(std::pow(excess_of_part, 1 / order), 1.5, 8.0))));
-    };
     const double indirect = std::sqrt(std::max(0.0, e.random * e.random - e.direct * e.direct)),
                  share = 0.65 * left;
-    if (e.direct > share) next.sub_samples = grown(next.sub_samples, e.direct / share, 0.8, 4096);
+    if (e.direct > share)
+        next.sub_samples = grown(next.sub_samples, e.direct / share, 0.8, most_direct_samples);
     if (indirect > share && context.indirect)
         next.directions = grown(next.directions, indirect / share, 1.5, 1 << 14);
     step.possible = !(next == stage.settings);

@@ -9,6 +9,7 @@
 namespace gonio {
 
 inline constexpr int runs_at_first = 6, most_runs = 16, most_window_runs = 32;
+inline constexpr int most_direct_samples = 4096;
 
 // Of a sample of the facets.
 double rms_slope(const HeightField& surface);
@@ -29,6 +30,15 @@ struct NextStep {
     int more_runs = 0;      // > 0: at the same settings; 0: a new stage at `settings`
     RunSettings settings;
 };
+// n, times what brings a part of the error down by `excess` if it falls as n^-order: 1.5 to 8 times, at most
+// `most`.
+int grown(int n, double excess, double order, int most);
+// Of a stage most of whose bias is what slivers may hide that no sample met: more sub-samples, as many as are
+// likely to find them. A finer mesh would find them, too, but each part of it costs an operator's row.
+// Nothing if slivers are not what is missing, or so many points that more are no longer worth it have missed
+// them.
+std::optional<NextStep> more_sub_samples(const MeasuredScene& scene, const Stage& stage,
+                                         const Estimate& estimate, double target);
 // Of a stage that sees the surface in windows, most of the error is which part of it was seen: more runs,
 // more windows, or the whole period where that is less work and fits. Nothing if that would not help.
 std::optional<NextStep> more_windows(const MeasuredScene& scene, const Stage& stage, double excess,

@@ -4,16 +4,23 @@
 
 namespace gonio {
 
-// Stages on the mesh of the last one are independent estimates of the same values: f and se of their mean,
-// weighted by their pooled variances; bias is left 0.
+// Stages on the mesh of the last one are independent estimates of the same values: f, se and hidden of their
+// mean, weighted by what each leaves in doubt; bias is left 0.
 Estimate average_stages(const MeasuredScene& scene, const std::vector<Stage>& stages);
 
-// Share of each row's light that falls on, or is seen of, slivers which no sample met; 0 for windows and open
-// surfaces, whose projected areas are not known.
-std::vector<double> unresolved_rows(const MeasuredScene& scene, const Stage& stage);
+// Bound on what each row of a slice ([channel][slice], counted through) misses of the light that falls on, or
+// is seen of, slivers which no sample met; 0 for windows and open surfaces, whose projected areas are not
+// known.
+std::vector<double> hidden_light(const MeasuredScene& scene, const Stage& stage, size_t slice);
 
-// Fills total, random, systematic and direct from f, se and bias, and from the direct part of `last`, which
-// tells of channel 0.
-void summarise(const MeasuredScene& scene, const Stage& last, Estimate& estimate);
+// The weight of a stage is one over this: se and hidden of a slice, relative, squared and summed over its
+// rows.
+double pooled_doubt(const Stage& stage, size_t slice, const std::vector<double>& se,
+                    const std::vector<double>& hidden);
+
+// Fills what is relative from f, se, bias and hidden, and from the direct part of `last`: of `channel`, to be
+// multiplied by unit_direct.
+void summarise(const MeasuredScene& scene, const Stage& last, size_t channel, double unit_direct,
+               Estimate& estimate);
 
 }  // namespace gonio

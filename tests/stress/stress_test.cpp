@@ -123,6 +123,41 @@ TEST(Stress, GroovesOfAnySlopePitchAndAngle) {
     EXPECT_GT(within_two, 0.85 * n) << "of " << n;
 }
 
+// A view along the ridges sees a thousandth of each wall. Points on the walls find it; a finer mesh, which
+// was tried first, did not reach the target with forty times the work.
+TEST(Stress, SliversGetSamplesNotAFinerMesh) {
+    const HeightField groove = generate_v_groove(16, 1e-3, 45);
+    BrdfPlan plan = plan_of({{0, 0}}, {{10, 30}, {40, 0}, {70, 200}, {89.94, 139.86}});
+    plan.accuracy.target_relative_error = 0.02;
+    const auto setting = [](const Report& report, const std::string& name) {
+        return std::find_if(report.settings.begin(), report.settings.end(),
+                            [&](const auto& entry) { return entry.first == name; })
+            ->second;
+    };
+    for (const int max_order : {1, 0}) {
+        plan.max_order = max_order;
+        const BrdfResult result = measure(groove, gray({0.5}), plan);
+        EXPECT_TRUE(result.report.target_met) << result.report.relative_error;
+        EXPECT_EQ(setting(result.report, "refinement"), "1");
+        for (size_t row = 0; row < result.table.rows() && max_order == 1; ++row) {
+            const double exact = reference::v_groove_direct(1, 0.5, plan.incident[0], plan.outgoing[row]);
+            EXPECT_NEAR(result.table.f[row], exact, 4 * doubt(result.table, row) + 1e-5 * exact) << row;
+        }
+    }
+
+    // A millionth of each wall: no number of samples is worth it. It ends, and says which direction it was.
+    plan.outgoing.back() = {89.94, 0};
+    plan.max_order = 1;
+    const Report report =
+        measure(generate_v_groove(16, 1e-3, degrees(std::atan(1000))), gray({0.5}), plan).report;
+    EXPECT_FALSE(report.target_met);
+    EXPECT_EQ(setting(report, "refinement"), "1");
+    EXPECT_EQ(setting(report, "sub_samples"), "4096");
+    EXPECT_TRUE(std::any_of(report.warnings.begin(), report.warnings.end(), [](const std::string& warning) {
+        return warning.find("outgoing theta 89.94, phi 0 degrees, 100 %") != std::string::npos;
+    }));
+}
+
 TEST(Stress, SpikesPitsAndSteps) {
     const auto flat_but = [](auto&& change) {
         std::vector<double> heights(24 * 20, 0.0);

@@ -8,6 +8,8 @@
 
 #include "base/numeric.h"
 #include "measure/run_limit.h"
+#include "measure/stage_average.h"
+#include "surface/generate.h"
 
 namespace gonio {
 namespace {
@@ -182,6 +184,35 @@ TEST(Accuracy, RowsWithoutLightOrNoiseHaveNoError) {
     }
     for (const Moments* moments : {&constant, &black})
         for (const double se : standard_errors(*moments, 0, groups)) EXPECT_EQ(se, 0);
+}
+
+// Two stages that scatter alike. What the first saw of the second view is none of its light, and hides it
+// all.
+TEST(Stages, OneThatMissedSliversWeighsLittle) {
+    const HeightField plane = generate_plane(2, 1);
+    const Material material{{"y"}, Lambertian{{1}}};
+    MeasuredScene scene;
+    scene.surface = &plane;
+    scene.material = &material;
+    scene.lights = {{0, 0, 1}};
+    scene.views = {{0, 0, 1}, {0.8, 0, 0.6}};
+    scene.groups.light = {0, 0}, scene.groups.view = {0, 1};
+    scene.groups.n_lights = 1, scene.groups.n_views = 2;
+    std::vector<Stage> stages(2);
+    for (int k = 0; k < 2; ++k)
+        for (const float noise : {-0.01f, 0.01f}) {
+            const float seen = static_cast<float>(k);
+            stages[k].f.add({1 + noise, seen + noise});
+            stages[k].projected_lights.add({1});
+            stages[k].projected_views.add({1, seen});
+        }
+    const Estimate e = average_stages(scene, stages);
+    EXPECT_NEAR(e.f[1], 1, 0.01);
+    EXPECT_LT(e.hidden[1], 0.01);
+    EXPECT_GT(e.hidden[1], 0);
+    EXPECT_EQ(e.hidden[0], 0);
+    EXPECT_EQ(hidden_light(scene, stages[1], 0), (std::vector<double>{0, 0}));
+    EXPECT_DOUBLE_EQ(hidden_light(scene, stages[0], 0)[1], 1 / pi);  // at most 1 / (pi cos)
 }
 
 TEST(RunLimit, RunsAreThoseAskedForOrThoseThatATargetTakes) {
