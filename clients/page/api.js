@@ -55,8 +55,18 @@ export async function request(path, options = {}) {
     }
 }
 
+/** The JSON of an answer; Unreachable if it breaks off. */
+async function jsonOf(response) {
+    try {
+        return await response.json();
+    } catch (error) {
+        if (error.name === "AbortError" || error instanceof SyntaxError) throw error;
+        throw new Unreachable(`the answer of ${location.host} broke off`);
+    }
+}
+
 export async function getJson(path, options) {
-    return (await request(path, options)).json();
+    return jsonOf(await request(path, options));
 }
 
 /** Whether the server asks for a token: then links need it too, and cannot carry it. */

@@ -12,6 +12,7 @@ export class LiveJobs {
     #jobs = new Map();
     #followed = new Set();
     #wake = () => {};
+    #asked = false;
     #wanted = 20;
     #more = false;
 
@@ -26,6 +27,7 @@ export class LiveJobs {
     async run() {
         for (let failures = 0; ; ) {
             let seconds = 10;
+            this.#asked = false;
             try {
                 await this.#load();
                 if (failures > 0) this.onConnection(null);
@@ -40,12 +42,14 @@ export class LiveJobs {
                     console.warn(error);
                 }
             }
-            await this.#sleep(seconds);
+            // What was wanted while the answer was on its way is not in it.
+            if (!this.#asked) await this.#sleep(seconds);
         }
     }
 
     /** Asks again at once. */
     refresh() {
+        this.#asked = true;
         this.#wake();
     }
 
