@@ -1,6 +1,5 @@
 #include <cmath>
 
-#include "base/parallel.h"
 #include "measure/accuracy.h"
 #include "measure/glossy_sky.h"
 #include "measure/relit_runs.h"
@@ -56,14 +55,14 @@ class GlossyRelitRuns final : public RelitRuns {
             add_cosines(sky_.tile(), views_, bits, 1.0, options_.n_threads, here);
             add_cosines(sky_.tile(), views_, bits, share, options_.n_threads, seen);
             const Radiances direct = sky_.direct(place, every_part);
-            add_sent(direct, here, share, sent);
+            add_sent(tile(), direct, here, share, options_.n_threads, sent);
             for (size_t c = 0; c < direct.size(); ++c)
                 for (size_t k = 0; k < direct[c].size(); ++k)
                     result.radiance[c][k] += static_cast<float>(share) * direct[c][k];
         }
         const Radiances indirect = sky_.indirect(every_part);
         std::vector<double> sent_indirectly(sent.size(), 0.0);
-        add_sent(indirect, seen, 1.0, sent_indirectly);
+        add_sent(tile(), indirect, seen, 1.0, options_.n_threads, sent_indirectly);
         for (size_t c = 0; c < indirect.size(); ++c)
             for (size_t k = 0; k < indirect[c].size(); ++k) result.radiance[c][k] += indirect[c][k];
         const std::vector<double> projected = projected_areas(sky_.tile(), seen, static_cast<int>(n_views));
@@ -81,21 +80,6 @@ class GlossyRelitRuns final : public RelitRuns {
     void describe(int runs, Report& report) const override { sky_.describe(runs, report); }
 
   private:
-    // sent[channel][view] += share * sum of area cosine radiance.
-    void add_sent(const Radiances& radiances, const VisibleCosines& seen, double share,
-                  std::vector<double>& sent) const {
-        const Tile& tile = sky_.tile();
-        const std::vector<float> area = core_areas(tile);
-        parallel_for(static_cast<int>(sent.size()), options_.n_threads, [&](int k) {
-            const size_t v = k % views_.size();
-            const float* radiance = &radiances[k / views_.size()][v * tile.n_unknowns()];
-            double sum = 0;
-            for (size_t u = 0; u < tile.n_unknowns(); ++u)
-                sum += static_cast<double>(area[u % tile.n_slots()]) * seen.of(u)[v] * radiance[u];
-            sent[k] += share * sum;
-        });
-    }
-
     const RunOptions& options_;
     const Monitor& monitor_;
     GlossySky sky_;

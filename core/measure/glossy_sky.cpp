@@ -5,6 +5,7 @@
 #include "base/error.h"
 #include "base/parallel.h"
 #include "measure/describe.h"
+#include "measure/sky_light.h"
 #include "scattering/irradiance.h"
 #include "visibility/march.h"
 
@@ -15,14 +16,11 @@ constexpr size_t directions_together = 64, receivers_together = 256;
 
 Environment supported_sky(const HeightField& surface, const Material& material,
                           const Environment& environment) {
-    if (surface.base.is_curved())
-        throw Error(ErrorCode::invalid_input, "/base", "",
-                    "an environment lights flat bases only; a BRDF, BTF or maps know curved ones");
     for (const WeightedLobe& part : material.lobes)
         if (std::holds_alternative<Mirror>(part.lobe))
             throw Error(ErrorCode::invalid_input, "/material", "mirror",
-                        "is not measured under an environment: needs a lobe of some width, as ggx");
-    return for_channels(environment, static_cast<int>(material.channels.size()));
+                        "is in no light field under an environment: needs a lobe of some width, as ggx");
+    return sky_on_flat_base(surface, static_cast<int>(material.channels.size()), environment);
 }
 
 // Channels that scatter alike: their lobes are computed once.

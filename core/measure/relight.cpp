@@ -13,6 +13,7 @@
 #include "measure/mesh_bias.h"
 #include "measure/relit_runs.h"
 #include "measure/run_limit.h"
+#include "scattering/backward.h"
 #include "visibility/view_map.h"
 
 namespace gonio {
@@ -33,6 +34,11 @@ PixelGrid pixel_grid(const HeightField& s, const RelightPlan& plan, const MarchG
     return pixels;
 }
 
+bool has_mirror(const Material& material) {
+    return std::any_of(material.lobes.begin(), material.lobes.end(),
+                       [](const WeightedLobe& part) { return std::holds_alternative<Mirror>(part.lobe); });
+}
+
 // Bytes at the peak: irradiance, the carried orders, the sum of each channel, views, the operator.
 double peak_bytes(const HeightField& s, const Material& material, const RelightPlan& plan) {
     const Accuracy::Samples samples = samples_of(plan);
@@ -43,6 +49,9 @@ double peak_bytes(const HeightField& s, const Material& material, const RelightP
     };
     const double cells = static_cast<double>(s.nx) * s.ny,
                  unknowns = 2 * cells * samples.refinement * samples.refinement;
+    if (has_mirror(material))
+        return BackwardTracer::estimated_bytes(s) + 8 * unknowns * views +
+               (24 * unknowns + 4 * cells) * views * n_channels;
     // Of each view and channel four times a float a part, their sum as a double; the images.
     if (!pure_lambertian(material))
         return GlossySky::run_bytes(s, samples, n_channels) + 24 * unknowns * views * n_channels +
@@ -72,7 +81,9 @@ class Measurement {
                             number(static_cast<double>(options.max_bytes) / 1e9) +
                             " GB of working memory: crop or resample the surface, or ask for fewer channels");
         for (const AnglesDeg& view : plan.outgoing) views_.push_back(to_vector(view));
-        const auto make_runs = pure_lambertian(material) ? lambertian_relit_runs : glossy_relit_runs;
+        const auto make_runs = has_mirror(material)        ? mirror_relit_runs
+                               : pure_lambertian(material) ? lambertian_relit_runs
+                                                           : glossy_relit_runs;
         runs_ = make_runs(surface, material, environment, plan, samples_, options, monitor);
     }
 
@@ -153,7 +164,9 @@ class Measurement {
                         static_cast<float>(sums_[c][layer * n_unknowns + unknown] / runs);
                 }
         }
-        const double mesh = predict_mesh_bias(surface_).guess / std::pow(samples_.refinement, 2),
+        const double mesh = runs_->evens_out_parts()
+                                ? predict_mesh_bias(surface_).guess / std::pow(samples_.refinement, 2)
+                                : 0.0,
                      relative = std::hypot(runs_->remainder(), mesh);
         const std::vector<double> doubts = runs_->doubts();
         for (size_t k = 0; k < relit.mean.size(); ++k)
@@ -223,6 +236,20 @@ RowGroups view_groups(int n_views) {
     return groups;
 }
 
+void add_sent(const Tile& tile, const std::vector<std::vector<float>>& radiances, const VisibleCosines& seen,
+              double share, int n_threads, std::vector<double>& sent) {
+    const std::vector<float> area = core_areas(tile);
+    const size_t n_views = sent.size() / radiances.size();
+    parallel_for(static_cast<int>(sent.size()), n_threads, [&](int k) {
+        const size_t v = k % n_views;
+        const float* radiance = &radiances[k / n_views][v * tile.n_unknowns()];
+        double sum = 0;
+        for (size_t u = 0; u < tile.n_unknowns(); ++u)
+            sum += static_cast<double>(area[u % tile.n_slots()]) * seen.of(u)[v] * radiance[u];
+        sent[k] += share * sum;
+    });
+}
+
 RelightResult measure_relight(const HeightField& surface, const Material& material,
                               const Environment& environment, const RelightPlan& plan,
                               const RunOptions& options, const Monitor& monitor) {
@@ -245,6 +272,8 @@ Prediction predict_relight(const HeightField& surface, const Material& material,
         prediction.cpu_seconds =
             0.05 + samples.replicates * GlossySky::run_seconds(surface, samples, static_cast<int>(channels),
                                                                plan.azimuths, views * facets);
+    if (has_mirror(material))
+        prediction.cpu_seconds = 0.05 + samples.replicates * samples.sub_samples * views * facets * 1.2e-6;
     if (plan.accuracy.max_seconds)
         prediction.cpu_seconds = std::min(prediction.cpu_seconds, *plan.accuracy.max_seconds);
     prediction.memory_bytes = (64 << 20) + peak_bytes(surface, material, plan);

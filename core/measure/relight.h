@@ -14,7 +14,8 @@ namespace gonio {
 
 struct RelightPlan {
     std::vector<AnglesDeg> outgoing;
-    // >= 3: of the horizon slices of Lambertian facets; glossy ones look at azimuths^2 directions a run.
+    // >= 3: of the horizon slices of Lambertian facets; glossy ones look at azimuths^2 directions a run, and
+    // what mirrors are mixed with draws from these.
     int azimuths = 16;
     int pixels_x = 0, pixels_y = 0;  // over the measured rectangle; 0: one a cell
     // Where a view ray belongs to a pixel: at the highest point of the relief, or at height 0 as it was
@@ -43,7 +44,7 @@ struct RelightResult {
     Report report;
 };
 
-// Throws Error: for mirrors; for curved bases; for RGB light on a spectrum; limit; cancelled.
+// Throws Error: for curved bases; for RGB light on a spectrum; limit; cancelled.
 RelightResult measure_relight(const HeightField& surface, const Material& material,
                               const Environment& environment, const RelightPlan& plan,
                               const RunOptions& options, const Monitor& monitor = {});

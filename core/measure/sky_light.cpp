@@ -4,16 +4,13 @@
 #include "base/random.h"
 
 namespace gonio {
-namespace {
 
-SplitEnvironment split_for(const HeightField& surface, const Environment& environment, int n_channels) {
+Environment sky_on_flat_base(const HeightField& surface, int n_channels, const Environment& environment) {
     if (surface.base.is_curved())
         throw Error(ErrorCode::invalid_input, "/base", "",
                     "an environment lights flat bases only; a BRDF, BTF or maps know curved ones");
-    return split_key_lights(for_channels(environment, n_channels));
+    return for_channels(environment, n_channels);
 }
-
-}  // namespace
 
 SkyLight::SkyLight(const HeightField& surface, const Environment& environment, int n_channels, int azimuths,
                    uint64_t seed, const RunOptions& options, const Monitor& monitor)
@@ -21,7 +18,7 @@ SkyLight::SkyLight(const HeightField& surface, const Environment& environment, i
       seed_(seed),
       options_(options),
       monitor_(monitor),
-      split_(split_for(surface, environment, n_channels)) {}
+      split_(split_key_lights(sky_on_flat_base(surface, n_channels, environment))) {}
 
 double SkyLight::shift(int run, uint64_t which) const {
     constexpr uint64_t stream = uint64_t{1} << 32;  // FacetLight's runs use the streams below

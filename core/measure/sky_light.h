@@ -13,6 +13,10 @@ inline float value(const Fields& fields, size_t unknown, int column) {
     return fields.block(column / column_block)[unknown * column_block + column % column_block];
 }
 
+// The channels of an environment that a material of n_channels needs. Throws Error: for RGB light on a
+// spectrum; for curved bases.
+Environment sky_on_flat_base(const HeightField& surface, int n_channels, const Environment& environment);
+
 class SkyLight {
   public:
     // azimuths: of the horizon slices. The references must outlive it. Throws Error: for RGB light on a
