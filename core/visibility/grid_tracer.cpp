@@ -2,6 +2,7 @@
 #include "visibility/grid_tracer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -37,21 +38,94 @@ HWY_INLINE Rays load(const RayBatch& b, size_t at) {
             hn::LoadU(d, &b.dy[at]), hn::LoadU(d, &b.dz[at]), hn::LoadU(di, &b.id[at])};
 }
 
-// Appends the lanes of the mask.
+#if HWY_TARGET <= HWY_AVX3 || HWY_TARGET == HWY_SCALAR
+// Brings the lanes of a mask to the front.
+struct Packing {
+    M mask;
+
+    HWY_INLINE explicit Packing(M lanes) : mask(lanes) {}
+    HWY_INLINE VF operator()(VF values) const { return hn::Compress(values, mask); }
+    HWY_INLINE VI operator()(VI values) const { return hn::Compress(values, hn::RebindMask(DI(), mask)); }
+};
+#else
+// [mask]: its lanes, then whichever.
+constexpr size_t most_lanes = hn::MaxLanes(DI());
+constexpr auto lanes_of_masks = [] {
+    std::array<std::array<int32_t, most_lanes>, size_t{1} << most_lanes> table{};
+    for (size_t mask = 0; mask < table.size(); ++mask) {
+        size_t n = 0;
+        for (size_t lane = 0; lane < most_lanes; ++lane)
+            if (mask >> lane & 1) table[mask][n++] = static_cast<int32_t>(lane);
+    }
+    return table;
+}();
+
+// Brings the lanes of a mask to the front. Compress of Highway 1.0 does, too, but GCC 12 copies its table to
+// the stack at every call: half the time of a ray.
+struct Packing {
+    decltype(hn::SetTableIndices(DI(), static_cast<const int32_t*>(nullptr))) lanes;
+
+    HWY_INLINE explicit Packing(M mask) {
+        uint8_t bits[8];
+        hn::StoreMaskBits(D(), mask, bits);
+        lanes = hn::SetTableIndices(DI(), lanes_of_masks[bits[0]].data());
+    }
+    HWY_INLINE VI operator()(VI values) const { return hn::TableLookupLanes(values, lanes); }
+    HWY_INLINE VF operator()(VF values) const { return hn::BitCast(D(), (*this)(hn::BitCast(DI(), values))); }
+};
+#endif
+
+// Appends the lanes of the mask. Whole vectors are stored, over what comes later and the batch's padding:
+// stores of some lanes take several times as long.
 HWY_INLINE void append(const Rays& r, M mask, RayBatch& b) {
     const D d;
     const DI di;
-    const auto mask_i = hn::RebindMask(di, mask);
+    const Packing packed(mask);
     const size_t at = b.n;
-    hn::CompressStore(r.i, mask_i, di, &b.i[at]);
-    hn::CompressStore(r.j, mask_i, di, &b.j[at]);
-    hn::CompressStore(r.u, mask, d, &b.u[at]);
-    hn::CompressStore(r.v, mask, d, &b.v[at]);
-    hn::CompressStore(r.z, mask, d, &b.z[at]);
-    hn::CompressStore(r.dx, mask, d, &b.dx[at]);
-    hn::CompressStore(r.dy, mask, d, &b.dy[at]);
-    hn::CompressStore(r.dz, mask, d, &b.dz[at]);
-    b.n += hn::CompressStore(r.id, mask_i, di, &b.id[at]);
+    hn::StoreU(packed(r.i), di, &b.i[at]);
+    hn::StoreU(packed(r.j), di, &b.j[at]);
+    hn::StoreU(packed(r.u), d, &b.u[at]);
+    hn::StoreU(packed(r.v), d, &b.v[at]);
+    hn::StoreU(packed(r.z), d, &b.z[at]);
+    hn::StoreU(packed(r.dx), d, &b.dx[at]);
+    hn::StoreU(packed(r.dy), d, &b.dy[at]);
+    hn::StoreU(packed(r.dz), d, &b.dz[at]);
+    hn::StoreU(packed(r.id), di, &b.id[at]);
+    b.n += hn::CountTrue(d, mask);
+}
+
+struct Corners {
+    VF h00, h10, h01, h11;
+};
+
+// Of a cell in every lane.
+HWY_INLINE Corners corners_of(const TraceGrid& grid, VI cell) {
+    const D d;
+#if HWY_TARGET <= HWY_AVX3 || HWY_TARGET == HWY_SCALAR
+    const VI corner = hn::ShiftLeft<2>(cell);
+    const float* first = grid.corners.data();
+    return {hn::GatherIndex(d, first, corner), hn::GatherIndex(d, first + 1, corner),
+            hn::GatherIndex(d, first + 2, corner), hn::GatherIndex(d, first + 3, corner)};
+#else
+    // A load a cell and a transposition: gathers take twice as long.
+    const DI di;
+    alignas(64) int32_t at[hn::MaxLanes(di)];
+    hn::Store(cell, di, at);
+    const hn::CappedTag<float, 4> four;
+    const auto cells = [&](int first) HWY_ATTR {
+        const auto low = hn::LoadU(four, &grid.corners[4 * static_cast<size_t>(at[first])]);
+#if HWY_TARGET == HWY_AVX2
+        return hn::Combine(d, hn::LoadU(four, &grid.corners[4 * static_cast<size_t>(at[first + 4])]), low);
+#else
+        return low;
+#endif
+    };
+    const VF a = cells(0), b = cells(1), c = cells(2), e = cells(3);
+    const VF ac_low = hn::InterleaveLower(d, a, c), be_low = hn::InterleaveLower(d, b, e),
+             ac_high = hn::InterleaveUpper(d, a, c), be_high = hn::InterleaveUpper(d, b, e);
+    return {hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
+            hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)};
+#endif
 }
 
 // Away from 0, so that its inverse is finite: a ray along an axis strays by 1e-8 cell a cell.
@@ -124,12 +198,8 @@ HWY_INLINE void walk(const TraceGrid& grid, RayBatch& rays, size_t at, size_t co
         M walking = hn::AndNot(jump, active);
         if (hn::AllFalse(d, walking)) continue;
 
-        const VI corner = hn::ShiftLeft<2>(cell);
-        const VF h00 = hn::GatherIndex(d, grid.corners.data(), corner),
-                 h10 = hn::GatherIndex(d, grid.corners.data() + 1, corner),
-                 h01 = hn::GatherIndex(d, grid.corners.data() + 2, corner),
-                 h11 = hn::GatherIndex(d, grid.corners.data() + 3, corner);
-        const auto plane = [&](M upper, VF u, VF v) {
+        const auto [h00, h10, h01, h11] = corners_of(grid, cell);
+        const auto plane = [&, h00 = h00, h10 = h10, h01 = h01, h11 = h11](M upper, VF u, VF v) {
             const VF gradient_u = hn::IfThenElse(upper, hn::Sub(h11, h01), hn::Sub(h10, h00));
             const VF gradient_v = hn::IfThenElse(upper, hn::Sub(h01, h00), hn::Sub(h11, h10));
             return hn::MulAdd(gradient_u, u, hn::MulAdd(gradient_v, v, h00));
@@ -186,7 +256,7 @@ HWY_INLINE void walk(const TraceGrid& grid, RayBatch& rays, size_t at, size_t co
     }
     if (!hn::AllFalse(d, hit)) {
         const VI kind = hn::IfThenElseZero(hn::RebindMask(di, upper_hit), one_i);
-        hn::CompressStore(kind, hn::RebindMask(di, hit), di, &hits.kind[hits.n]);
+        hn::StoreU(Packing(hit)(kind), di, &hits.kind[hits.n]);
         append(r, hit, hits);
     }
     if (!hn::AllFalse(d, gone)) append(r, gone, escaped);
