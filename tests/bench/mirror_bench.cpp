@@ -236,6 +236,7 @@ void compare_tables(double slope, int truth_sub_samples) {
 }  // namespace
 
 int main() {
+    std::setvbuf(stdout, nullptr, _IOLBF, 0);  // it takes minutes
     std::printf(
         "# grid tracer against Embree %s packets on reflected rays, CPU ns a ray, median of 5 interleaved\n",
         RTC_VERSION_STRING);
