@@ -23,6 +23,11 @@ struct BaseCase {
     BaseCurvature base;
 };
 
+// As in curved_glossy_test.cpp.
+void PrintTo(const BaseCase& base, std::ostream* out) {
+    *out << base.name;
+}
+
 class CurvedBase : public ::testing::TestWithParam<BaseCase> {};
 
 TEST_P(CurvedBase, FacetsAreThoseOfTheDisplacedMesh) {

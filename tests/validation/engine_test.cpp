@@ -84,16 +84,21 @@ class Comparison {
     std::vector<Entry> entries_;
 };
 
-// All quantities of a case: the totals of all albedos in one run, single orders in another.
+// All quantities of a case in one measurement: totals of all albedos, single orders at albedo 1.
 void compare(const Case& expected, const HeightField& surface, const Accuracy::Samples& samples,
              Tolerance tolerance, double largest_sigma = 0.003) {
-    const BrdfResult total = measure(surface, expected.material(false), expected.plan(), samples);
-    const BrdfResult single = measure(surface, expected.material(true), expected.plan(2), samples);
+    Material material = expected.material(false);
+    auto& albedos = std::get<Lambertian>(material.lobes.front().lobe).albedo.constant;
+    const size_t white = albedos.size();
+    albedos.push_back(1);
+    material.channels.emplace_back("single orders");
+    BrdfPlan plan = expected.plan();
+    plan.separate_orders = true;
+    const Table table = measure(surface, material, plan, samples).table;
     Comparison comparison(expected.name, tolerance, largest_sigma);
     size_t channel = 0;
     for (const Quantity& quantity : expected.quantities)
-        comparison.add(expected, quantity, quantity.order ? single.table : total.table,
-                       quantity.order ? 0 : channel++);
+        comparison.add(expected, quantity, table, quantity.order ? white : channel++);
 }
 
 // Directional albedos: the mean of pi f over views of equal projected solid angle. Within 3 sigma with sigma
