@@ -96,9 +96,9 @@ RunForecast forecast_graph(const MeasuredScene& scene, const RunSettings& settin
     const Scene s(scene, settings);
     const double parts = settings.refinement * settings.refinement,
                  groups = static_cast<double>(channel_groups(*scene.material).size()),
-                 rays = s.facets * settings.directions / 9 / parts,
-                 pairs = s.indirect ? rays * share_that_hits(s.slope) : 0.0,
                  values = s.facets * s.lights * s.views * (s.same ? 0.5 : 1.0);
+    double rays = s.facets * settings.directions / 9 / parts,
+           pairs = s.indirect ? rays * share_that_hits(s.slope) : 0.0;
     const double total_share = reflected_share(*scene.material);
     double per_value = 0, per_row = 0, direct = 0, indirect = 0;
     for (const WeightedLobe& part : scene.material->lobes) {
@@ -121,10 +121,14 @@ RunForecast forecast_graph(const MeasuredScene& scene, const RunSettings& settin
                 std::hypot(indirect, share * family.indirect_error * spread / (1 + spread / (0.5 * s.slope)));
         }
     }
+    const Tile tile = run_tiles(scene, settings, 0, 0).front();
+    const int sampled = s.indirect ? first_sampled_order(scene, tile, settings.directions) : 0;
+    if (sampled == 2) rays = pairs = 0;
     RunForecast run;
     run.cpu_seconds =
         s.facets * s.sides() * (11.5e-9 + 5.7e-9 * s.sub_samples) +
         groups * values * per_value * (1 + 0.1 * s.sub_samples) + (s.indirect ? 23e-9 * rays : 0.0) +
+        (sampled > 0 ? 600e-9 * s.facets / parts * s.lights * sampled_rays_per_facet(settings) : 0.0) +
         groups * pairs * (250e-9 + 9e-9 * s.lights + 2.8e-9 * s.views + per_row * (2 * s.lights + s.views));
     run.direct = std::hypot(direct, of_windows(s, settings));
     if (s.indirect) {
@@ -132,8 +136,7 @@ RunForecast forecast_graph(const MeasuredScene& scene, const RunSettings& settin
         run.lasting = 0.12 * indirect;  // directions that are used twice: graph_transport.cpp
         // What chains of lobes narrower than the directions are dense miss (graph_run.h): of order 3 and up
         // half from 30 times on, of order 2 from 1000 times on.
-        const double lobe = lobe_share_of_pair(*scene.material, *scene.grid,
-                                               run_tiles(scene, settings, 0, 0).front(), settings.directions),
+        const double lobe = lobe_share_of_pair(*scene.material, *scene.grid, tile, settings.directions),
                      order_2 = std::min(0.5, 0.1 * std::pow(s.slope / usual_slope, 1.5));
         if (lobe > most_honest_share)
             run.untold = order_2 * lobe / (lobe + 1000) +

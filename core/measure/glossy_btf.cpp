@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/half.h"
+#include "base/numeric.h"
 #include "base/parallel.h"
 #include "measure/accuracy.h"
 #include "measure/btf_views.h"
@@ -89,14 +90,24 @@ class Measurement final : public GlossyPictures {
                 mean.se.push_back(static_cast<float>(se));
         const double mesh = predict_mesh_bias(surface_).guess / std::pow(samples_.refinement, 2),
                      left = std::hypot(mesh, pixels_.remainder());
-        for (size_t p = 0; p < planes; ++p)
-            for (size_t v = 0; v < n_views; ++v)
+        std::vector<double> rare(planes);  // mean square over the views
+        for (size_t p = 0; p < planes; ++p) {
+            for (size_t v = 0; v < n_views; ++v) {
+                const size_t k = p * n_views + v;
+                const double least = pixels_.undersampled(p / n_lights, p % n_lights, mean.f[k]);
+                // What the scatter tells already is not told twice (see GraphTransport::add_rare).
+                const double missed = safe_sqrt(least * least - 2.0 * mean.se[k] * mean.se[k]);
                 mean.bias.push_back(
-                    static_cast<float>(mean.f[p * n_views + v] * std::hypot(left, places_[p])));
+                    static_cast<float>(std::hypot(mean.f[k] * std::hypot(left, places_[p]), missed)));
+                rare[p] += missed * missed / static_cast<double>(n_views);
+            }
+        }
         const double n = static_cast<double>(runs.size());
+        // What a mean misses its pixels miss, too.
         for (size_t p = 0; p < planes; ++p)
             btf.pixel_se.push_back(std::sqrt(std::max(0.0, squares[p] - sum_squares[p] / n) / (n - 1) / n /
-                                             static_cast<double>(n_views * shape_.n_pixels())));
+                                                 static_cast<double>(n_views * shape_.n_pixels()) +
+                                             rare[p]));
         return btf;
     }
 
@@ -222,10 +233,11 @@ class Measurement final : public GlossyPictures {
         pixels_.describe(report_);
         report_.counters.push_back({"view_rays_unresolved", unresolved_});
         report_.seconds = {{"wall", limit_.seconds()}};
-        if (pixels_.lobe_share_of_pair() > most_honest_share)
+        if (pixels_.has_narrow_lobes())
             report_.warnings.push_back(
-                "the lobes are narrower than the shared directions are dense: orders 3 and up of single "
-                "pixels are rough (see pixel_se); ask for more directions");
+                "the lobes are narrower than the shared directions are dense: orders 2 and up of single "
+                "pixels are rough, and what may be missed is in the bias and in pixel_se; ask for more "
+                "directions");
     }
 
     const HeightField& surface_;

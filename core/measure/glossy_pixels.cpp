@@ -74,14 +74,23 @@ GlossyPixels::GlossyPixels(const HeightField& surface, const Material& material,
     if (plan.cameras) cameras_ = camera_places(surface, plan);
     plane_height_ = view_plane_height(surface, plan);
     if (surface.base.is_curved()) facet_heights_ = facet_heights(surface, tile_);
+    if (context_.indirect && plan.max_order != 1)
+        narrow_ = narrow_lobes(material_, grid_, tile_, samples.directions);
+    if (narrow_)
+        later_ = trace_later_light(surface, material_, lights_, plan.max_order, plan.accuracy.seed,
+                                   options.n_threads, monitor);
     run_bytes_ =
         glossy_run_bytes(btf_shape(surface, material, plan, samples.refinement), samples, surface.base);
 }
 
-double GlossyPixels::lobe_share_of_pair() const {
-    return context_.indirect && plan_.max_order != 1
-               ? gonio::lobe_share_of_pair(material_, grid_, tile_, samples_.directions)
-               : 0.0;
+double GlossyPixels::undersampled(size_t channel, size_t light, double found) const {
+    if (!narrow_) return 0;
+    const std::vector<double>& later = later_[light][channel];
+    const double mean = std::accumulate(later.begin(), later.end(), 0.0) / pi;
+    return gonio::undersampled(
+        narrow_, later,
+        chains_of_pairs(narrow_, later, pairs_, started_runs_ * static_cast<double>(tile_.n_unknowns())), 0,
+        std::min(found, mean));
 }
 
 bool GlossyPixels::fits_another() const {

@@ -4,6 +4,7 @@
 
 #include "measure/btf.h"
 #include "measure/graph_run.h"
+#include "measure/narrow_lobes.h"
 
 namespace gonio {
 
@@ -35,7 +36,10 @@ class GlossyPixels {
     void forget_runs() { runs_.clear(); }
 
     double remainder() const { return remainder_; }  // as in GraphOrders: the largest
-    double lobe_share_of_pair() const;               // as in graph_run.h; 0 if no pairs are needed
+    // What too few chains of all runs leave of a mean over the pixels, in 1/sr, of which `found` was found
+    // with the first order; 0 unless lobes are narrow (narrow_lobes.h).
+    double undersampled(size_t channel, size_t light, double found) const;
+    bool has_narrow_lobes() const { return static_cast<bool>(narrow_); }
     void describe(Report& report) const;
 
   private:
@@ -70,6 +74,8 @@ class GlossyPixels {
     double run_bytes_ = 0;
     int started_runs_ = 0;
     std::vector<Run> runs_;
+    NarrowLobes narrow_;
+    LaterLight later_;  // if there are such
     double rays_ = 0, pairs_ = 0, truncated_ = 0, remainder_ = 0;
     int orders_ = 0;
 };

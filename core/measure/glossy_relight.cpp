@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "base/numeric.h"
 #include "measure/accuracy.h"
 #include "measure/glossy_sky.h"
 #include "measure/relit_runs.h"
@@ -24,13 +25,23 @@ class GlossyRelitRuns final : public RelitRuns {
     int layers() const override { return static_cast<int>(views_.size()); }
     double remainder() const override { return sky_.remainder(); }
 
-    // From order 3 on the shared directions are used more than once (see shared_directions_doubt).
+    // From order 3 on the shared directions are used more than once (see shared_directions_doubt); and of
+    // narrow lobes what the scatter does not tell (see GraphTransport::add_rare).
     std::vector<double> doubts() const override {
         std::vector<double> doubts;
         const size_t n_views = views_.size();
-        for (size_t c = 0; c < sky_.n_channels(); ++c)
-            for (const double se : standard_errors(indirect_, c * n_views, view_groups(layers())))
-                doubts.push_back(shared_directions_doubt * std::sqrt(indirect_.count()) * se);
+        const std::vector<double> least = sky_.undersampled(views_, indirect_.count());
+        for (size_t c = 0; c < sky_.n_channels(); ++c) {
+            const std::vector<double> se = standard_errors(means_, c * n_views, view_groups(layers())),
+                                      se_indirect =
+                                          standard_errors(indirect_, c * n_views, view_groups(layers()));
+            for (size_t v = 0; v < n_views; ++v) {
+                const double rare = least[c * n_views + v];
+                doubts.push_back(
+                    std::hypot(shared_directions_doubt * std::sqrt(indirect_.count()) * se_indirect[v],
+                               safe_sqrt(rare * rare - 2 * se[v] * se[v])));
+            }
+        }
         return doubts;
     }
 
@@ -74,6 +85,7 @@ class GlossyRelitRuns final : public RelitRuns {
             means_indirect.push_back(area > 0 ? static_cast<float>(sent_indirectly[k] / area) : 0.0f);
         }
         indirect_.add(means_indirect);
+        means_.add(result.means);
         return result;
     }
 
@@ -84,6 +96,7 @@ class GlossyRelitRuns final : public RelitRuns {
     const Monitor& monitor_;
     GlossySky sky_;
     std::vector<Vec3> views_;
+    Moments means_;     // [channel][view]
     Moments indirect_;  // what orders 2 and up add to the means, [channel][view]
 };
 

@@ -1,10 +1,14 @@
 #include "measure/glossy_sky.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "base/error.h"
 #include "base/parallel.h"
+#include "material/lobe_shape.h"
 #include "measure/describe.h"
+#include "measure/narrow_lobes.h"
 #include "measure/sky_light.h"
 #include "scattering/irradiance.h"
 #include "visibility/march.h"
@@ -119,6 +123,7 @@ GlossySky::GlossySky(const HeightField& surface, const Material& material, const
       n_directions_(azimuths * azimuths),
       max_order_(max_order),
       sky_(supported_sky(surface, material, environment)),
+      surface_(surface),
       material_(simplified(material)),
       alike_(channels_alike(material_)) {
     grid_ = make_march_grid(surface);
@@ -269,6 +274,38 @@ Radiances GlossySky::indirect(const Receivers& receivers) {
     return radiances;
 }
 
+std::vector<double> GlossySky::undersampled(const std::vector<Vec3>& views, int runs) const {
+    std::vector<double> least(n_channels() * views.size(), 0.0);
+    const NarrowLobes at_first = narrower_lobes(material_, 2 * pi / n_directions_),
+                      beyond = indirect_ ? narrow_lobes(material_, grid_, tile_, samples_.directions)
+                                         : NarrowLobes{};
+    if (!at_first && !beyond) return least;
+    // What a view receives of a uniform sky is what leaves of a light from there (reciprocity).
+    LaterLight later;
+    if (beyond)
+        later =
+            trace_later_light(surface_, material_, views, max_order_, seed_, options_.n_threads, monitor_);
+    // Facets of a plane look all alike.
+    const double facets = indirect_ ? static_cast<double>(tile_.n_unknowns()) : 1.0,
+                 looks = facets * runs * static_cast<double>(places_.size()) * n_directions_;
+    for (size_t c = 0; c < n_channels(); ++c)
+        for (size_t v = 0; v < views.size(); ++v) {
+            const double irradiance = horizontal_irradiance(sky_, static_cast<int>(c)),
+                         first = at_first.share * reflected_share(material_) / pi /
+                                 std::sqrt(1 + looks * at_first.solid_angle / (2 * pi));
+            double orders = 0;
+            if (beyond) {
+                std::vector<double> chains = chains_of_pairs(
+                    beyond, later[v][c], runs * static_cast<double>(graph_.size()), facets * runs);
+                for (double& n : chains) n *= n_directions_;
+                const double mean = std::accumulate(later[v][c].begin(), later[v][c].end(), 0.0) / pi;
+                orders = gonio::undersampled(beyond, later[v][c], chains, 0, mean);
+            }
+            least[c * views.size() + v] = irradiance * std::hypot(first, orders);
+        }
+    return least;
+}
+
 void GlossySky::describe(int runs, Report& report) const {
     report.settings = {{"transport", "pair graph"},
                        {"runs", std::to_string(runs)},
@@ -279,11 +316,11 @@ void GlossySky::describe(int runs, Report& report) const {
                        {"sky_directions", std::to_string(n_directions_)},
                        {"simd", simd_target()}};
     report.counters = {{"rays", rays_}, {"pairs", pairs_}, {"truncated_bundles", truncated_}};
-    if (indirect_ && max_order_ != 2 &&
-        lobe_share_of_pair(material_, grid_, tile_, samples_.directions) > most_honest_share)
+    if ((indirect_ && narrow_lobes(material_, grid_, tile_, samples_.directions)) ||
+        narrower_lobes(material_, 2 * pi / n_directions_))
         report.warnings.push_back(
-            "the lobes are narrower than the shared directions are dense: orders 3 and up are rough; ask for "
-            "more directions");
+            "the lobes are narrower than the shared directions are dense: single facets are rough, and what "
+            "may be missed is in the errors; ask for more azimuths and directions");
 }
 
 }  // namespace gonio

@@ -49,6 +49,9 @@ class GlossySky {
 
     bool has_indirect() const { return indirect_; }
     double remainder() const { return remainder_; }  // as in GraphOrders: the largest
+    // What too few directions of all runs leave of means over the surface at least, [channel][view]; 0 unless
+    // lobes are narrow (narrow_lobes.h).
+    std::vector<double> undersampled(const std::vector<Vec3>& views, int runs) const;
     void describe(int runs, Report& report) const;
     // Predicted for one run: bytes beside what the receivers take, and CPU seconds.
     static double run_bytes(const HeightField& surface, const Accuracy::Samples& samples, int n_channels);
@@ -66,6 +69,7 @@ class GlossySky {
     const Monitor& monitor_;
     int n_directions_, max_order_;
     Environment sky_;
+    const HeightField& surface_;
     Material material_;  // in fewest lobes
     MarchGrid grid_;
     Tile tile_;

@@ -6,6 +6,7 @@
 
 #include "base/error.h"
 #include "base/half.h"
+#include "base/numeric.h"
 #include "measure/accuracy.h"
 #include "measure/btf_views.h"
 #include "measure/describe.h"
@@ -278,18 +279,26 @@ class SkyPictures final : public GlossyPictures {
         Moments moments;
         for (const std::vector<float>& run : means) moments.add(run);
         mean.f.assign(moments.mean().begin(), moments.mean().end());
+        std::vector<Vec3> views;
+        for (const AnglesDeg& view : mean.outgoing) views.push_back(to_vector(view));
+        const std::vector<double> least = sky_->undersampled(views, n_runs());
         const double mesh = predict_mesh_bias(surface_).guess / std::pow(samples_.refinement, 2),
                      runs = n_runs(),
                      pixels = static_cast<double>(shape_.n_views) * static_cast<double>(shape_.n_pixels());
         for (int c = 0; c < shape_.n_channels; ++c) {
-            for (const double se :
-                 standard_errors(moments, c * size_t(shape_.n_views), view_groups(shape_.n_views)))
-                mean.se.push_back(static_cast<float>(se));
-            for (int v = 0; v < shape_.n_views; ++v)
-                mean.bias.push_back(static_cast<float>(
-                    mean.f[c * shape_.n_views + v] * std::hypot(mesh, sky_->remainder(), pixel_places_[c])));
-            btf.pixel_se.push_back(
-                std::sqrt(std::max(0.0, squares[c] - sum_squares[c] / runs) / (runs - 1) / runs / pixels));
+            const size_t first = c * size_t(shape_.n_views);
+            const double left = std::hypot(mesh, sky_->remainder(), pixel_places_[c]);
+            const std::vector<double> se = standard_errors(moments, first, view_groups(shape_.n_views));
+            double rare = 0;  // mean square over the views
+            for (int v = 0; v < shape_.n_views; ++v) {
+                // As in glossy_btf.cpp.
+                const double missed = safe_sqrt(std::pow(least[first + v], 2) - 2 * se[v] * se[v]);
+                mean.se.push_back(static_cast<float>(se[v]));
+                mean.bias.push_back(static_cast<float>(std::hypot(mean.f[first + v] * left, missed)));
+                rare += missed * missed / shape_.n_views;
+            }
+            btf.pixel_se.push_back(std::sqrt(
+                std::max(0.0, squares[c] - sum_squares[c] / runs) / (runs - 1) / runs / pixels + rare));
         }
         return btf;
     }

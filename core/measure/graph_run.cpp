@@ -301,11 +301,11 @@ double graph_run_bytes(const GraphContext& context, const RunSettings& settings,
     const double sides = 8 * unknowns * (n_lights + n_views + 32),
                  pairs = unknowns * settings.directions / (s.base.corrects_horizons() ? 1.0 : 9.0) * 0.35,
                  turned = s.base.is_curved() ? 8 * unknowns * light_block + sizeof(PairBend) * pairs : 0;
-    // Rays along lobes may meet any cell of the surface; most_honest_share at the largest subset of facets.
+    // Rays along lobes may meet any cell of the surface. At the largest subset of facets:
     const double slope = context.grid->max_slope,
                  share = highest_peak(*context.material) * 4 * pi * slope / std::sqrt(1 + slope * slope) * 9 *
                          settings.refinement * settings.refinement / settings.directions,
-                 traced = share > most_honest_share ? 24.0 * s.nx * s.ny : 0.0;
+                 traced = share > narrow_share_of_pair ? 24.0 * s.nx * s.ny : 0.0;
     return sides + turned + traced + 20 * pairs +
            scatter_bytes(pairs, std::min(n_lights * turned_coefficients(s.base), light_block), n_views) +
            16.0 * 2 * n_lights * n_views * static_cast<double>(context.channel_groups.size());
@@ -321,7 +321,7 @@ double lobe_share_of_pair(const Material& material, const MarchGrid& grid, const
 int first_sampled_order(const MeasuredScene& scene, const Tile& tile, int n_directions) {
     if (scene.surface->base.is_curved()) return 0;
     const double share = lobe_share_of_pair(*scene.material, *scene.grid, tile, n_directions);
-    return share > most_share_of_order_2 ? 2 : share > most_honest_share ? 3 : 0;
+    return share > most_share_of_order_2 ? 2 : share > narrow_share_of_pair ? 3 : 0;
 }
 
 double sampled_rays_per_facet(const RunSettings& settings) {

@@ -331,6 +331,15 @@ void GraphTransport::describe(const std::vector<Stage>& stages, const RunValues&
             "the lobes are so much narrower than the shared directions are dense that only " + number(met) +
             " chains of samples meet a view on average: the biases hold the light of orders 2 and up that "
             "single values may miss; more \"directions\", or receiver cells, do better");
+    const Tile tile = run_tiles(context_, last.settings, 0, 0).front();
+    if (const double share =
+            lobe_share_of_pair(*context_.material, *context_.grid, tile, last.settings.directions);
+        share > most_honest_share && !of.lobes && context_.plan->separate_orders)
+        report.warnings.push_back(
+            "the lobes are narrower than the shared directions are dense (the peak of one sends a pair " +
+            number(share) +
+            " times what it got): orders 3 and up alone have heavier tails than the stated errors tell; more "
+            "\"directions\" do better");
 }
 
 }  // namespace gonio

@@ -26,20 +26,25 @@ double narrow_share(const NarrowLobes& lobes, size_t k) {
 
 }  // namespace
 
-NarrowLobes narrow_lobes(const Material& material, const MarchGrid& grid, const Tile& tile,
-                         int n_directions) {
-    const double pair = highest_peak(material) > 0
-                            ? lobe_share_of_pair(material, grid, tile, n_directions) / highest_peak(material)
-                            : 0.0;  // sr
+NarrowLobes narrower_lobes(const Material& material, double solid_angle) {
     NarrowLobes narrow;
     for (const LobeShape& shape : lobe_shapes(material)) {
-        const double solid_angle = 4 * pi * shape.width * shape.width;
-        if (shape.share * pair <= most_honest_share * solid_angle) continue;
+        const double of_shape = 4 * pi * shape.width * shape.width;
+        // What little a lobe reflects in all is spread as thinly as by a wider one.
+        if (of_shape >= solid_angle * shape.share) continue;
         narrow.share += shape.share / reflected_share(material);
-        narrow.solid_angle = std::min(narrow.solid_angle, solid_angle);
-        narrow.share_of_pair = std::max(narrow.share_of_pair, shape.share * pair / solid_angle);
+        narrow.solid_angle = std::min(narrow.solid_angle, of_shape);
     }
-    const double slope = grid.max_slope, slab = 4 * pi * slope / std::sqrt(1 + slope * slope);
+    return narrow;
+}
+
+NarrowLobes narrow_lobes(const Material& material, const MarchGrid& grid, const Tile& tile,
+                         int n_directions) {
+    const double peak = highest_peak(material);
+    if (!(peak > 0)) return {};
+    const double slope = grid.max_slope, slab = 4 * pi * slope / std::sqrt(1 + slope * slope),
+                 pair = lobe_share_of_pair(material, grid, tile, n_directions) / peak;
+    NarrowLobes narrow = narrower_lobes(material, pair / narrow_share_of_pair);
     narrow.chance_of_pair = std::min(1.0, narrow.solid_angle / slab);
     return narrow;
 }

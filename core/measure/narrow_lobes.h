@@ -24,11 +24,11 @@ struct NarrowLobes {
     double share = 0;           // of all reflected light, in such lobes; 0: there are none
     double solid_angle = 4;     // of the narrowest, sr: what it reflects over its peak
     double chance_of_pair = 1;  // that a pair leaves a facet inside that
-    double share_of_pair = 0;   // lobe_share_of_pair (graph_run.h)
-
     explicit operator bool() const { return share > 0; }
 };
-// At so many shared directions: those that send a pair more than most_honest_share (graph_run.h).
+// Those that reach over less than `solid_angle`.
+NarrowLobes narrower_lobes(const Material& material, double solid_angle);
+// At so many shared directions: those that send a pair more than narrow_share_of_pair (graph_run.h).
 NarrowLobes narrow_lobes(const Material& material, const MarchGrid& grid, const Tile& tile, int n_directions);
 
 // What leaves the surface after k + 2 reflections, of the flux that a light brings: [light][channel][k].

@@ -171,6 +171,13 @@ class Measurement {
         const std::vector<double> doubts = runs_->doubts();
         for (size_t k = 0; k < relit.mean.size(); ++k)
             relit.bias.push_back(std::hypot(relative * relit.mean[k], doubts[k]));
+        // What a mean misses its facets miss, too.
+        for (int c = 0; c < n_channels_; ++c) {
+            double squares = 0;
+            for (size_t v = 0; v < views_.size(); ++v)
+                squares += std::pow(doubts[c * views_.size() + v], 2) / static_cast<double>(views_.size());
+            relit.radiance_se[c] = std::hypot(relit.radiance_se[c], std::sqrt(squares));
+        }
     }
 
     void draw_images() {

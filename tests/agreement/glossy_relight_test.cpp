@@ -76,6 +76,33 @@ TEST(GlossyRelight, APlaneReflectsItsDirectionalAlbedo) {
     }
 }
 
+// Under a white sky a view receives what a light from there would lose into the sky. Of lobes of alpha 1e-4
+// hardly any look meets that: the bias knows.
+TEST(GlossyRelight, KnowsWhatNarrowLobesHide) {
+    const HeightField relief = field();
+    for (const double alpha : {0.05, 1e-3, 1e-5}) {
+        const Material material = of({{1.0, ggx(alpha, alpha)}});
+        const Relit found = relit(relief, material, uniform_environment({2}), plan_of(6));
+        BrdfPlan plan;
+        plan.incident = views;
+        plan.outgoing_cells = equal_cells(1);
+        plan.outgoing = centres(plan.outgoing_cells);
+        plan.accuracy.samples = Accuracy::Samples{4, 64, 1, 4};
+        const Table reflected = measure(relief, material, plan).table;
+        double missed = 0;
+        for (size_t v = 0; v < views.size(); ++v) {
+            const double expected = 2 * pi * reflected.f[v];
+            const double sigma = std::hypot(found.se[v], found.bias[v]);
+            EXPECT_LE(std::abs(found.mean[v] - expected), 3 * sigma) << alpha << " " << v;
+            if (alpha == 0.05) {
+                EXPECT_LT(sigma, 0.03 * expected);
+            }
+            missed += std::pow(found.bias[v], 2) / static_cast<double>(views.size());
+        }
+        EXPECT_GT(found.radiance_se[0], std::sqrt(missed));
+    }
+}
+
 // What is lost is what single scattering on the facets loses: nothing of a white mixture, and of GGX more
 // than its least directional albedo lets through in each order.
 TEST(GlossyRelight, Furnace) {

@@ -58,7 +58,7 @@ struct Coverage {
 // Order 2 by pairs or by rays, those beyond by rays. Errors are cautious where views are darker than the
 // mean, for the least error is the same for all of them.
 TEST(NarrowLobes, ErrorsCoverThePathTracer) {
-    for (const double alpha : {0.15, 0.08, 0.04}) {
+    for (const double alpha : {0.12, 0.08, 0.04}) {
         BrdfPlan plan = plan_of(equal_projected_hemisphere(16), product_grid({20, 50, 70}, {30, 150, 270}),
                                 Accuracy::Samples{2, 64, 1, 6});
         plan.separate_orders = true;
