@@ -79,7 +79,7 @@ int main(int argc, char** argv) {
     write_factored_btf(job, result.btf, factored);
     const double writing_factored = bench::cpu_seconds() - start;
     start = bench::cpu_seconds();
-    write_btf_images(job, result.btf, plain, {});
+    write_btf_images(job, result.btf, ImageForm::arrays, plain, {});
     const double writing = bench::cpu_seconds() - start;
     const size_t size = std::filesystem::file_size(plain);
     std::filesystem::remove(plain);
