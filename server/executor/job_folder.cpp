@@ -47,10 +47,12 @@ void copy_inputs(json& document, const fs::path& origin, const fs::path& folder)
     }
 }
 
-// What decides, beside the processor, in which order OpenBLAS adds. Engines do not hand the environment on.
-std::string blas_kernels() {
+// No threads of OpenBLAS, which spin for 30 ms a core when a process begins; and what decides, beside the
+// processor, in which order it adds. Engines do not hand the environment on.
+std::string blas_environment() {
     const char* chosen = std::getenv("OPENBLAS_CORETYPE");
-    return chosen ? "export OPENBLAS_CORETYPE=" + shell_quoted(chosen) + "\n" : "";
+    return "export OPENBLAS_NUM_THREADS=1\n" +
+           (chosen ? "export OPENBLAS_CORETYPE=" + shell_quoted(chosen) + "\n" : std::string());
 }
 
 std::string script_of(const JobFolder& folder, const LoadedJob& job, const ShardCommand& command,
@@ -64,7 +66,7 @@ std::string script_of(const JobFolder& folder, const LoadedJob& job, const Shard
     if (job.reference) shard += " --reference " + std::to_string(job.reference->paths);
     return R"(#!/bin/sh
 # Computes one shard: run INDEX, or run LIST LINE for the number in that line of a list.
-)" + blas_kernels() +
+)" + blas_environment() +
            R"(if [ $# = 2 ]; then index=$(sed -n "$2p" "$1"); else index=$1; fi
 cd )" + shell_quoted(folder.dispatch()) +
            R"( || exit 1
