@@ -26,6 +26,9 @@ TEST(HugePages, AnArrayOfTheSameSizeGetsTheMemoryOfTheLastOne) {
     EXPECT_NE(small, first);  // 10 MiB would be wasted on it
     for (const auto& [memory, bytes] : {std::pair{other, 9 * mib}, {small, 3 * mib}})
         give_back_huge_pages(memory, bytes);
+    void* const large = take_huge_pages(50 * mib);  // none that waits has room for it
+    for (void* const waiting : {first, other, small}) EXPECT_NE(large, waiting);
+    give_back_huge_pages(large, 50 * mib);
 }
 
 TEST(HugePages, NoMoreWaitsThanTheLimit) {
