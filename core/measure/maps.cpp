@@ -36,6 +36,11 @@ struct LayerSum {
     MapLayer layer;
     std::vector<double> sum, squares;
     bool is_light = false;
+    // Whose light it is that came over other facets, where these are glossy.
+    struct Indirect {
+        size_t light, channel;
+    };
+    std::optional<Indirect> indirect;
 };
 
 class Measurement {
@@ -78,6 +83,11 @@ class Measurement {
         }
         light_.describe(runs_, result.report);
         if (glossy_) glossy_->describe(result.report);
+        if (glossy_ && glossy_->has_narrow_lobes())
+            result.report.warnings.push_back(
+                "the lobes are narrower than the shared directions are dense: indirect light is rough, and "
+                "what "
+                "may be missed is in the se of its layers; ask for more directions");
         result.report.relative_error = error_;
         result.report.target_met =
             plan_.accuracy.samples || plan_.accuracy.target() == 0 || error_ <= plan_.accuracy.target();
@@ -130,6 +140,8 @@ class Measurement {
                             name, c,
                             [&](size_t u) { return unit * glossy_->direct_irradiance(u, first + l); },
                             [&](size_t u) { return unit * glossy_->indirect_irradiance(u, c, first + l); });
+                        for (size_t back : {1, 2})  // indirect, total
+                            layers_[next_ - back].indirect = {first + l, static_cast<size_t>(c)};
                         continue;
                     }
                     const float* total = column_of((*all)[c], column);
@@ -212,6 +224,12 @@ class Measurement {
             const double n = static_cast<double>(n_cells_);
             sum.layer.mean = mean / n;
             sum.layer.se = std::sqrt(variance / n / runs_);
+            // Light that arrives over narrow lobes no pair may meet. What leaves after two reflections and
+            // more stands for what arrived by them: a little less.
+            if (sum.indirect)
+                sum.layer.se = std::hypot(
+                    sum.layer.se, pi * glossy_->undersampled(sum.indirect->channel, sum.indirect->light,
+                                                             sum.layer.mean / pi));
             if (sum.is_light && sum.layer.name.find(".total.") != std::string::npos && sum.layer.mean > 0)
                 error_ = std::max(error_, sum.layer.se / sum.layer.mean);
         }

@@ -1,6 +1,8 @@
 // Maps against closed forms of planes and V-grooves, and their light against the BRDF.
 #include "measure/maps.h"
 
+#include <algorithm>
+
 #include "agreement/measured.h"
 #include "surface/generate.h"
 
@@ -111,6 +113,28 @@ TEST(Maps, OfGlossyFacetsAreIrradiances) {
         EXPECT_LE(rms, 1.5 * std::hypot(albedo * a.se, b.se) + 1e-6) << a.name;
         EXPECT_NEAR(albedo * a.mean, b.mean, 0.01 * b.mean) << a.name;
     }
+}
+
+// No pair meets a lobe of alpha 1e-4, and all runs agree that nothing arrives: the error knows how much does.
+// It is about what arrives over lobes of alpha 0.3, which pairs do meet.
+TEST(Maps, KnowWhatNarrowLobesHide) {
+    const auto indirect = [](double alpha, bool& warned) {
+        Microfacet lobe;
+        lobe.alpha_x = lobe.alpha_y = alpha;
+        lobe.reflectance.reflectance = 1.0;
+        const MapsResult found = measure_maps(generate_gaussian(64, 64, 1, 8, 0.7, 12), {{"y"}, lobe},
+                                              maps_plan({{60, 200}}, {}, {1, 64, 1, 4}), {});
+        warned =
+            std::any_of(found.report.warnings.begin(), found.report.warnings.end(),
+                        [](const std::string& text) { return text.find("narrower") != std::string::npos; });
+        return layer(found.maps, "light000.indirect.y");
+    };
+    bool wide_warns = false, narrow_warns = false;
+    const MapLayer wide = indirect(0.3, wide_warns), narrow = indirect(1e-4, narrow_warns);
+    EXPECT_GT(narrow.se, 0.5 * wide.mean);
+    EXPECT_LT(narrow.se, 2 * wide.mean);
+    EXPECT_TRUE(narrow_warns);
+    EXPECT_FALSE(wide_warns);
 }
 
 TEST(Maps, StateTheErrorOfAPixel) {
