@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "agreement/measured.h"
-#include "agreement/traced_sky.h"
+#include "agreement/relit.h"
 #include "base/error.h"
 #include "material/facet_brdf.h"
 #include "measure/relight.h"
@@ -12,14 +12,11 @@
 namespace gonio {
 namespace {
 
+using test::of;
+using test::relit_field;
+
 const std::vector<AnglesDeg> views = {{0, 0}, {45, 30}, {70, 200}};
 
-Material of(std::vector<WeightedLobe> lobes, std::vector<std::string> channels = {"y"}) {
-    Material material;
-    material.channels = std::move(channels);
-    material.lobes = std::move(lobes);
-    return material;
-}
 Lobe ggx(double alpha_x, double alpha_y, double reflectance = 1) {
     Microfacet lobe;
     lobe.alpha_x = alpha_x, lobe.alpha_y = alpha_y;
@@ -42,9 +39,6 @@ Relit relit(const HeightField& surface, const Material& material, const Environm
     RunOptions options;
     options.n_threads = n_threads;
     return measure_relight(surface, material, sky, plan, options).relit;
-}
-HeightField field() {
-    return generate_gaussian(48, 48, 1, 6, 0.8, 4);
 }
 
 // Share of the light of a view's direction that a plane reflects, by the midpoint rule.
@@ -79,7 +73,7 @@ TEST(GlossyRelight, APlaneReflectsItsDirectionalAlbedo) {
 // Under a white sky a view receives what a light from there would lose into the sky. Of lobes of alpha 1e-4
 // hardly any look meets that: the bias knows.
 TEST(GlossyRelight, KnowsWhatNarrowLobesHide) {
-    const HeightField relief = field();
+    const HeightField relief = relit_field();
     for (const double alpha : {0.05, 1e-3, 1e-5}) {
         const Material material = of({{1.0, ggx(alpha, alpha)}});
         const Relit found = relit(relief, material, uniform_environment({2}), plan_of(6));
@@ -106,8 +100,9 @@ TEST(GlossyRelight, KnowsWhatNarrowLobesHide) {
 // What is lost is what single scattering on the facets loses: nothing of a white mixture, and of GGX more
 // than its least directional albedo lets through in each order.
 TEST(GlossyRelight, Furnace) {
-    const Relit white = relit(field(), white_mixture(), uniform_environment({1}), plan_of(8));
-    const Relit metal = relit(field(), of({{1.0, ggx(0.4, 0.4)}}), uniform_environment({1}), plan_of(8));
+    const Relit white = relit(relit_field(), white_mixture(), uniform_environment({1}), plan_of(8));
+    const Relit metal =
+        relit(relit_field(), of({{1.0, ggx(0.4, 0.4)}}), uniform_environment({1}), plan_of(8));
     double least = 1, most = 0;
     for (int theta = 0; theta < 90; theta += 5) {
         const double albedo = directional_albedo(of({{1.0, ggx(0.4, 0.4)}}), to_vector({theta + 0.5, 0}));
@@ -132,8 +127,8 @@ TEST(GlossyRelight, OfLambertianFacetsIsThatOfTheOtherEngine) {
     const std::vector<std::string> rgb = {"r", "g", "b"};
     const Lobe lobe = Lambertian{{0.9, 0.5, 0.2}};
     const RelightPlan plan = plan_of(16);
-    const Relit expected = relit(field(), of({{1.0, lobe}}, rgb), sky, plan),
-                glossy = relit(field(), of({{0.25, lobe}, {0.75, lobe}}, rgb), sky, plan);
+    const Relit expected = relit(relit_field(), of({{1.0, lobe}}, rgb), sky, plan),
+                glossy = relit(relit_field(), of({{0.25, lobe}, {0.75, lobe}}, rgb), sky, plan);
     ASSERT_EQ(glossy.radiance.size(), 3 * expected.radiance.size());
     for (size_t c = 0; c < 3; ++c) {
         for (size_t v = 0; v < 3; ++v)
@@ -162,9 +157,9 @@ TEST(GlossyRelight, ASunIsTheBrdfOfItsDirection) {
     sun.radiance[static_cast<size_t>(row) * sun.nx + column] = 1000;
     const double theta = pi * (row + 0.5) / sun.ny, phi = pi * (1 - 2 * (column + 0.5) / sun.nx);
     const Material material = of({{0.6, ggx(0.2, 0.4, 0.9)}, {0.4, Lambertian{0.8}}});
-    const Relit lit = relit(field(), material, sun, plan_of(16));
+    const Relit lit = relit(relit_field(), material, sun, plan_of(16));
     BrdfPlan brdf = plan_for_target({{degrees(theta), degrees(phi)}}, views, 0.004);
-    const Table table = measure_brdf(field(), material, brdf, {}).table;
+    const Table table = measure_brdf(relit_field(), material, brdf, {}).table;
     const double irradiance = horizontal_irradiance(sun, 0);
     for (size_t v = 0; v < views.size(); ++v) {
         const double expected = table.f[v] * irradiance,
@@ -183,26 +178,18 @@ TEST(GlossyRelight, AgreesWithThePathTracer) {
         for (const int max_order : {1, 0}) {
             RelightPlan plan = plan_of(8, m == 0 ? 2 : 1);
             plan.max_order = max_order;
-            const Relit lit = relit(field(), materials[m], sky, plan);
+            const Relit lit = relit(relit_field(), materials[m], sky, plan);
             PathTracerOptions options;
             options.paths = max_order == 1 ? 8000 : 16000;
             options.max_order = max_order;
-            for (size_t v = 0; v < views.size(); ++v) {
-                const test::Traced traced =
-                    test::trace(field(), materials[m], sky, to_vector(views[v]), options);
-                EXPECT_NEAR(lit.mean[v], traced.radiance,
-                            3.5 * std::hypot(lit.se[v], traced.se) + lit.bias[v])
-                    << m << " " << max_order << " " << v;
-                EXPECT_LT(traced.se, 0.02 * traced.radiance);
-                EXPECT_LT(lit.se[v], 0.01 * lit.mean[v]);
-                EXPECT_LT(lit.bias[v], 0.02 * lit.mean[v]);
-            }
+            SCOPED_TRACE("material " + std::to_string(m) + ", max_order " + std::to_string(max_order));
+            test::expect_what_paths_see(lit, materials[m], sky, views, options, 0.02);
         }
 }
 
 // A quarter of a turn of everything: relief, brushed facets, sky and views.
 TEST(GlossyRelight, TurnsWithReliefAndSky) {
-    const HeightField surface = field();
+    const HeightField surface = relit_field();
     HeightField turned = surface;
     const int n = surface.nx;
     for (int j = 0; j < n; ++j)  // (x, y) goes to (-y, x); nodes wrap
@@ -233,8 +220,8 @@ TEST(GlossyRelight, ChannelsHaveLightOfTheirOwn) {
     const Material three = of(one.lobes, {"r", "g", "b"});
     RelightPlan plan = plan_of(2);
     plan.accuracy.samples->directions = 64;
-    const Relit grey = relit(field(), one, uniform_environment({1}), plan),
-                colour = relit(field(), three, uniform_environment({1, 0, 3}), plan);
+    const Relit grey = relit(relit_field(), one, uniform_environment({1}), plan),
+                colour = relit(relit_field(), three, uniform_environment({1, 0, 3}), plan);
     for (size_t v = 0; v < views.size(); ++v) {
         EXPECT_NEAR(colour.mean[v], grey.mean[v], 1e-5);
         EXPECT_EQ(colour.mean[3 + v], 0);
@@ -257,7 +244,7 @@ TEST(GlossyRelight, SameBitsForAnyNumberOfThreads) {
 
 TEST(GlossyRelight, RefusesColoursOnASpectrum) {
     const Material spectral{{"400nm", "500nm"}, Phong{10.0, 0.5}};
-    EXPECT_THROW(relit(field(), spectral, uniform_environment({1, 2, 3}), plan_of(2)), Error);
+    EXPECT_THROW(relit(relit_field(), spectral, uniform_environment({1, 2, 3}), plan_of(2)), Error);
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "agreement/measured.h"
-#include "agreement/traced_sky.h"
+#include "agreement/relit.h"
 #include "base/error.h"
 #include "material/fresnel.h"
 #include "measure/relight.h"
@@ -12,15 +12,12 @@
 namespace gonio {
 namespace {
 
+using test::of;
+using test::relit_field;
+
 // Not the zenith, where a map has a value for each of its columns.
 const std::vector<AnglesDeg> views = {{5, 0}, {45, 30}, {70, 200}};
 
-Material of(std::vector<WeightedLobe> lobes, std::vector<std::string> channels = {"y"}) {
-    Material material;
-    material.channels = std::move(channels);
-    material.lobes = std::move(lobes);
-    return material;
-}
 Lobe mirror(double reflectance = 1) {
     Mirror lobe;
     lobe.reflectance.reflectance = reflectance;
@@ -38,9 +35,6 @@ RelightResult relit(const HeightField& surface, const Material& material, const 
     RunOptions options;
     options.n_threads = n_threads;
     return measure_relight(surface, material, sky, plan, options);
-}
-HeightField field() {
-    return generate_gaussian(48, 48, 1, 6, 0.8, 4);
 }
 Vec3 mirrored(const AnglesDeg& view) {
     const Vec3 d = to_vector(view);
@@ -108,13 +102,14 @@ TEST(MirrorRelight, AMixtureOnAPlaneIsItsParts) {
 // A white mirror shows a white sky wherever it looks; of what reflects a half, each order is what the limit
 // on the orders tells it from.
 TEST(MirrorRelight, Furnace) {
-    const Relit white = relit(field(), of({{1.0, mirror()}}), uniform_environment({1}), plan_of(4)).relit;
+    const Relit white =
+        relit(relit_field(), of({{1.0, mirror()}}), uniform_environment({1}), plan_of(4)).relit;
     for (size_t v = 0; v < views.size(); ++v) EXPECT_NEAR(white.mean[v], 1, 1e-5 + 2 * white.bias[v]) << v;
     EXPECT_LT(white.bias[0], 1e-4);
     for (const float radiance : white.images) ASSERT_NEAR(radiance, 1, 1e-4);
-    const Relit mixed =
-        relit(field(), of({{0.5, mirror()}, {0.5, Lambertian{1.0}}}), uniform_environment({1}), plan_of(16))
-            .relit;
+    const Relit mixed = relit(relit_field(), of({{0.5, mirror()}, {0.5, Lambertian{1.0}}}),
+                              uniform_environment({1}), plan_of(16))
+                            .relit;
     for (size_t v = 0; v < views.size(); ++v) {
         EXPECT_NEAR(mixed.mean[v], 1, 3.5 * mixed.se[v] + mixed.bias[v]) << v;
         EXPECT_LT(mixed.se[v], 0.01);
@@ -122,7 +117,7 @@ TEST(MirrorRelight, Furnace) {
     std::vector<double> share;  // of the light that takes so many reflections
     for (const int order : {1, 2, 3, 4}) {
         const auto mean = [&](double reflectance) {
-            return relit(field(), of({{1.0, mirror(reflectance)}}), uniform_environment({1}),
+            return relit(relit_field(), of({{1.0, mirror(reflectance)}}), uniform_environment({1}),
                          plan_of(4, 1, order))
                 .relit.mean[1];
         };
@@ -162,20 +157,13 @@ TEST(MirrorRelight, AgreesWithThePathTracer) {
     for (size_t m = 0; m < materials.size(); ++m)
         for (const int max_order : {1, 2, 0}) {
             const Relit lit =
-                relit(field(), materials[m], sky, plan_of(m == 0 ? 4 : 16, m == 0 ? 4 : 1, max_order)).relit;
+                relit(relit_field(), materials[m], sky, plan_of(m == 0 ? 4 : 16, m == 0 ? 4 : 1, max_order))
+                    .relit;
             PathTracerOptions options;
             options.paths = 20000;
             options.max_order = max_order;
-            for (size_t v = 0; v < views.size(); ++v) {
-                const test::Traced traced =
-                    test::trace(field(), materials[m], sky, to_vector(views[v]), options);
-                EXPECT_NEAR(lit.mean[v], traced.radiance,
-                            3.5 * std::hypot(lit.se[v], traced.se) + lit.bias[v])
-                    << m << " " << max_order << " " << v;
-                EXPECT_LT(traced.se, 0.02 * traced.radiance);
-                EXPECT_LT(lit.se[v], 0.01 * lit.mean[v]);
-                EXPECT_LT(lit.bias[v], 0.001 * lit.mean[v]);
-            }
+            SCOPED_TRACE("material " + std::to_string(m) + ", max_order " + std::to_string(max_order));
+            test::expect_what_paths_see(lit, materials[m], sky, views, options, 0.001);
         }
 }
 
@@ -183,10 +171,10 @@ TEST(MirrorRelight, AgreesWithThePathTracer) {
 TEST(MirrorRelight, StatesItsErrors) {
     const Material material = of({{0.4, mirror(0.9)}, {0.6, Lambertian{0.8}}});
     RelightPlan plan = plan_of(4);
-    const Relit few = relit(field(), material, test::uneven_sky(), plan).relit;
+    const Relit few = relit(relit_field(), material, test::uneven_sky(), plan).relit;
     plan.accuracy.samples->replicates = 32;
     plan.accuracy.seed = 2;
-    const Relit many = relit(field(), material, test::uneven_sky(), plan).relit;
+    const Relit many = relit(relit_field(), material, test::uneven_sky(), plan).relit;
     double squares = 0;
     for (size_t k = 0; k < few.radiance.size(); ++k)
         squares += std::pow(few.radiance[k] - many.radiance[k], 2) / static_cast<double>(few.radiance.size());
@@ -225,12 +213,12 @@ TEST(MirrorRelight, SameBitsForAnyNumberOfThreads) {
 }
 
 TEST(MirrorRelight, RefusesWhatOthersRefuse) {
-    HeightField curved = field();
+    HeightField curved = relit_field();
     curved.base.kappa_1 = 1e-3;
     EXPECT_THROW(relit(curved, of({{1.0, mirror()}}), uniform_environment({1}), plan_of(2)), Error);
-    EXPECT_THROW(
-        relit(field(), of({{1.0, mirror()}}, {"400nm", "500nm"}), uniform_environment({1, 2, 3}), plan_of(2)),
-        Error);
+    EXPECT_THROW(relit(relit_field(), of({{1.0, mirror()}}, {"400nm", "500nm"}),
+                       uniform_environment({1, 2, 3}), plan_of(2)),
+                 Error);
 }
 
 }  // namespace
